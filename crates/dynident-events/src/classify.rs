@@ -1,4 +1,4 @@
-//! Kind of an interval, from its signature.
+//! Classifies an event by the shape of its unexplained torque.
 
 use crate::contact::share_by_wrench;
 use crate::kind::EventKind;
@@ -9,18 +9,19 @@ use dynident_dynamics::{BatchWorkspace, Column, PanelLayout, Panels, ParametricM
 use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 
-/// Measured torque without drives, relative to the predicted torque (squares).
+/// Largest measured torque if the drives are off, relative to the torque that carries the weight (both squared).
 const MAX_TORQUE_OFF: f64 = 0.3;
-/// An interval that is at most this far from the first (last) bin with reliable motion begins (ends) with the log, s.
+/// Maximum time between the start (end) of an interval and the first (last) bin with reliable motion, s. If it is
+/// shorter, the event is treated as lasting from the start (to the end) of the log.
 const END_S: f64 = 1.0;
-/// Share of the unexplained squares that a signature has to explain.
+/// Minimum share of the squared residual in an interval that a kind of event must explain to be selected.
 const MIN_EXPLAINED: f64 = 0.6;
-/// Instants for the comparison with a force on a link.
+/// Number of instants that are compared with a force and a moment on one link.
 const INSTANTS: usize = 50;
-/// A contact may be at the link of a joint if its squared residual in the event is at least this multiple of its usual
-/// squared residual.
+/// Minimum ratio of a joint's squared residual in the event to its usual squared residual, if the contact is at the
+/// link of this joint.
 const MIN_TOUCH_RATIO: f64 = 1.0;
-/// Joints with at least this ratio of the strongest evidence belong to the event.
+/// Minimum evidence of a joint that belongs to the event, relative to the joint with the strongest evidence.
 const JOINT_SHARE: f64 = 0.02;
 
 pub(crate) struct Signature {
@@ -101,13 +102,14 @@ fn classified(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interv
     Signature { alternative: Some(EventKind::Contact), ..of(EventKind::Unexplained) }
 }
 
-/// Start and end of a range of bins, s.
+/// Start and end time of a range of bins, s.
 fn times(rows: &LogRows, bins: &Range<usize>) -> [f64; 2] {
     let half = 0.5 * rows.bin_s;
     [(rows.time_s[bins.start] - half).max(0.0), rows.time_s[bins.end - 1] + half]
 }
 
-/// The interval with the adjacent bins in which the joint rests; its torque grows from zero.
+/// Start and end of the interval with the adjacent bins in which the joint also rests: at a stop, the torque grows from
+/// zero.
 fn time_at_stop(rows: &LogRows, one: &Interval) -> [f64; 2] {
     let joint = one.strongest;
     let rests = |bin: &usize| rows.dq[joint][*bin].abs() <= rows.rest[joint];
@@ -117,7 +119,7 @@ fn time_at_stop(rows: &LogRows, one: &Interval) -> [f64; 2] {
     [rows.time_s[before] - half, rows.time_s[after] + half]
 }
 
-/// The same for a state that lasts to the start or the end of the log.
+/// Start and end of an event that lasts to the start or the end of the log.
 fn extended(rows: &LogRows, [from_s, to_s]: [f64; 2]) -> [f64; 2] {
     let half = 0.5 * rows.bin_s;
     let (first_s, last_s) = ((rows.time_s[0] - half).max(0.0), rows.time_s[rows.len() - 1] + half);
@@ -126,8 +128,8 @@ fn extended(rows: &LogRows, [from_s, to_s]: [f64; 2]) -> [f64; 2] {
     [from_s, if to_s + END_S >= reliable[1] { last_s } else { to_s }]
 }
 
-/// Times of the first and the last bin with reliable motion, s; those of the log without such bins. The ends of a log
-/// have none if it starts or ends in motion.
+/// Times of the first and the last bin with reliable motion, s; start and end of the log if there are no such bins. If
+/// a log starts or ends in motion, the bins there are not reliable.
 fn reliable(rows: &LogRows) -> [f64; 2] {
     let first = rows.usable.iter().position(|usable| *usable).unwrap_or(0);
     let last = rows.usable.iter().rposition(|usable| *usable).unwrap_or(rows.len() - 1);
@@ -146,8 +148,8 @@ fn is_torque_off(rows: &LogRows, scan: &Scan, one: &Interval, joints: &[usize]) 
     measured <= MAX_TORQUE_OFF * predicted
 }
 
-/// Shares of the unexplained squares of the interval that other masses at the last link explain, and that a constant
-/// torque of the strongest joint explains.
+/// Two shares of the squared residual in the interval: the share that other masses at the last link explain, and the
+/// share that a constant torque of the joint with the strongest evidence explains.
 fn load_and_offset(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> (f64, f64) {
     let strongest = one.strongest;
     let left = |joint: usize, bin: usize| scan.residuals[joint][bin] / scan.variance[joint][bin].sqrt();
@@ -163,7 +165,7 @@ fn load_and_offset(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &I
 fn load_share(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> f64 {
     let model = robot.model();
     let body = model.body_count() - 1;
-    // A load changes the mass and the centre of mass most.
+    // A payload changes mainly the mass and the centre of mass.
     let columns: Vec<Column> = (0..4).map(|parameter| Column::Body { body, parameter }).collect();
     let layout = PanelLayout::new(model, columns);
     let bins: Vec<usize> = one.bins.clone().collect();
@@ -182,7 +184,7 @@ fn load_share(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interv
         let at_bins = |value: &dyn Fn(usize) -> f64| {
             DVector::from_iterator(samples, bins.iter().map(|&bin| value(bin) / scan.variance[joint][bin].sqrt()))
         };
-        // Friction that grows with the torque is not determined without the load.
+        // Friction that grows with the load cannot be determined in an interval without the load.
         let friction = at_bins(&|bin| rows.row(joint, bin).last().copied().unwrap_or(0.0));
         let size = friction.norm_squared().max(f64::MIN_POSITIVE);
         let without_friction = |values: DVector<f64>| &values - &friction * (friction.dot(&values) / size);
@@ -215,7 +217,7 @@ fn differences(values: &[f64], step: f64) -> Vec<f64> {
     (0..values.len()).map(|at| (values[(at + 1).min(last)] - values[at.saturating_sub(1)]) / (2.0 * step)).collect()
 }
 
-/// Largest share that a force and a moment on one link explain.
+/// Largest share of the squared residual that a force and a moment on one link explain.
 fn contact_share(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> f64 {
     let model = robot.model();
     let stride = one.bins.len().div_ceil(INSTANTS).max(1);

@@ -1,11 +1,11 @@
-//! Share of unexplained torque that one force and one moment on a link explain.
+//! Share of the residual torque that one force and one moment on a link explain.
 
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::{JointKind, Model, Vec3};
 use nalgebra::{DMatrix, DVector};
 
-/// Torques of all joints for unit forces and moments in the base frame at the origin of `body`: `τ = Jᵀ w`, six
-/// columns.
+/// Joint torques for unit forces and moments in the base frame at the origin of `body`: the matrix `Jᵀ` of `τ = Jᵀ w`
+/// with six columns, for the wrench w.
 fn jacobian_transposed(model: &Model, workspace: &mut Workspace, q: &[f64], body: usize) -> DMatrix<f64> {
     let placements = body_placements(model, workspace, q);
     let at = placements[body].translation;
@@ -30,8 +30,8 @@ fn jacobian_transposed(model: &Model, workspace: &mut Workspace, q: &[f64], body
     out
 }
 
-/// The share of the weighted squares of `torques` (by instant, then joint) that a constant force and moment on `body`
-/// explain. `weights` are the inverse standard deviations of the joints.
+/// Share of the weighted squared `torques` (by instant, then joint) that a constant force and moment on `body` explain.
+/// `weights` are the inverse standard deviations of the joints' residuals.
 pub(crate) fn share_by_wrench(
     model: &Model,
     positions: &[Vec<f64>],

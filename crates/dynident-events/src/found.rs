@@ -1,4 +1,4 @@
-//! Events of the different searches as results.
+//! Converts the findings of the different searches to events.
 
 use crate::classify::signature;
 use crate::kind::{EventKind, LogEvent};
@@ -9,7 +9,7 @@ use crate::settings::EventSettings;
 use crate::trend::Trend;
 use dynident_dynamics::ParametricModel;
 
-/// An interval of the scan.
+/// Event from an interval of the search for unexplained torque.
 pub(crate) fn of_interval(
     rows: &LogRows,
     robot: &ParametricModel,
@@ -39,7 +39,7 @@ pub(crate) fn of_interval(
     }
 }
 
-/// A hole that was filled by straight lines; exact lines are clear evidence.
+/// Event for a hole in the log that was filled by straight lines. Exact straight lines are clear evidence.
 pub(crate) fn of_filled_hole(rows: &LogRows, scan: &Scan, joints: &[String], [from_s, to_s]: [f64; 2]) -> LogEvent {
     let inside = |bin: &usize| (from_s..=to_s).contains(&rows.time_s[*bin]);
     let bins: Vec<usize> = (0..rows.len()).filter(inside).collect();
@@ -64,7 +64,7 @@ pub(crate) fn of_filled_hole(rows: &LogRows, scan: &Scan, joints: &[String], [fr
     }
 }
 
-/// One interval of an overflow.
+/// Event for one interval in which the torque number overflows.
 pub(crate) fn of_overflow(
     one: &Overflow,
     [from_s, to_s]: [f64; 2],
@@ -87,7 +87,8 @@ pub(crate) fn of_overflow(
     }
 }
 
-/// A slow change, or the shorter part of a log after a sudden change of the offset.
+/// Event for a slow change of the torque, or for a sudden change of the offset. The event of a sudden change is the
+/// shorter part of the log, before or after the change.
 pub(crate) fn of_trend(rows: &LogRows, trend: &Trend, names: &[String], settings: &EventSettings) -> LogEvent {
     let half = 0.5 * rows.bin_s;
     let (first_s, last_s) = ((rows.time_s[0] - half).max(0.0), rows.time_s[rows.len() - 1] + half);

@@ -2,16 +2,17 @@
 
 use crate::rows::{TorquePiece, median};
 
-/// Minimum number of samples on one straight line.
+/// Minimum number of successive samples on one straight line.
 const MIN_SAMPLES: usize = 6;
-/// Second difference on a straight line, relative to the median of the channel. Chance: 3 % for a sample and a joint.
+/// Maximum second difference on a straight line, relative to the median of the channel. By chance, 3 % of the samples
+/// of a joint are below it.
 const MAX_CURVATURE: f64 = 0.04;
-/// Maximum share of samples on straight lines; more are a property of the recorder.
+/// Maximum share of samples on straight lines. A larger share is a property of the recorder.
 const MAX_SHARE: f64 = 0.3;
-/// Maximum number of joints whose torque is constant on the line; at rest, a torque without noise is constant.
+/// Minimum number of joints whose torque changes along the line: at rest, a torque without noise is constant.
 const MIN_SLOPED: usize = 1;
 
-/// Intervals (s) during which all torques follow exact straight lines, while at least one of them changes.
+/// Intervals (s) during which the torques of all joints follow exact straight lines, and at least one torque changes.
 pub(crate) fn straight_lines(pieces: &[TorquePiece]) -> Vec<[f64; 2]> {
     let mut found = Vec::new();
     let (mut straight, mut all) = (0, 0);
@@ -26,7 +27,7 @@ pub(crate) fn straight_lines(pieces: &[TorquePiece]) -> Vec<[f64; 2]> {
             .iter()
             .map(|tau| median(tau.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs()).collect()))
             .collect();
-        // A torque without noise is nearly straight at many places.
+        // A torque without noise is nearly straight in many places.
         if piece.tau.iter().zip(&usual).any(|(tau, usual)| is_smooth(tau, *usual)) {
             continue;
         }
@@ -40,7 +41,7 @@ pub(crate) fn straight_lines(pieces: &[TorquePiece]) -> Vec<[f64; 2]> {
         let mut from = 1;
         while from + 1 < samples {
             let to = (from..samples - 1).find(|&at| !is_straight(at)).unwrap_or(samples - 1);
-            // Sample `from - 1` and sample `to` are the measured ends of the line.
+            // Sample `from - 1` and sample `to` were measured; the samples between them are on the line.
             let sloped =
                 piece.tau.iter().zip(&usual).filter(|(tau, usual)| (tau[to] - tau[from - 1]).abs() > 0.1 * **usual);
             if to - from >= MIN_SAMPLES && sloped.count() >= MIN_SLOPED {
@@ -57,7 +58,7 @@ pub(crate) fn straight_lines(pieces: &[TorquePiece]) -> Vec<[f64; 2]> {
 /// Whether a torque has no noise: its third differences are smaller than its second differences.
 fn is_smooth(tau: &[f64], usual: f64) -> bool {
     let third = median(tau.windows(4).map(|four| (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).abs()).collect());
-    // White noise has the ratio 1.8, a sine with 20 samples to its period 0.3.
+    // Ratio of third to second differences: 1.8 for white noise, 0.3 for a sine with 20 samples per period.
     third < 0.6 * usual || usual == 0.0
 }
 

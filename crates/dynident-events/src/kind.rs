@@ -1,4 +1,4 @@
-//! Kinds of events, and one event.
+//! Kinds of events, and the data of one event.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,16 +10,16 @@ pub enum EventKind {
     /// The robot is at rest, and the measured torque is much smaller than the torque that carries its weight: drives
     /// off, brakes closed, emergency stop.
     DrivesOff,
-    /// One joint rests at the end of its travel in the log with a torque that the motion does not need.
+    /// One joint rests at the end of its range in the log with a torque that its motion does not require.
     JointStop,
-    /// The additional torque is that of a force or a moment on one link: push, collision, hand guiding.
+    /// A force or a moment on one link explains the additional torque: push, collision, hand guiding.
     Contact,
-    /// The additional torque is that of other masses at the last link, to the start or the end of the log: a tool was
+    /// Other masses at the last link explain the additional torque, from the start or to the end of the log: a tool was
     /// changed, or a part was picked up.
     LoadChange,
-    /// The torque of one joint has another constant offset, to the start or the end of the log.
+    /// The torque of one joint has another constant offset, from the start or to the end of the log.
     OffsetChange,
-    /// The torque differs by a constant jump from one end of its range to the other: overflow of a number.
+    /// The torque jumps by a constant amount from one end of its range to the other: overflow of the number format.
     Overflow,
     /// All torques follow exact straight lines: a hole in the log was filled.
     Interpolated,
@@ -27,12 +27,12 @@ pub enum EventKind {
     Drift,
     /// Friction changes slowly during the log: the joint warms up.
     WarmUp,
-    /// No signature of the other kinds.
+    /// Unexplained torque without the shape of any other kind.
     Unexplained,
 }
 
 impl EventKind {
-    /// Name in sentences.
+    /// Name of the kind in sentences.
     pub fn text(self) -> &'static str {
         match self {
             Self::DrivesOff => "drives off or brakes closed",
@@ -48,13 +48,13 @@ impl EventKind {
         }
     }
 
-    /// Whether no normal operation has this signature: drives off, a stop, a filled hole. On recorded
-    /// robots, errors of the model can have the signatures of the other kinds.
+    /// Whether normal operation cannot cause such torque: drives off, a stop, a filled hole. The other kinds can also
+    /// result from errors of the model, as recordings of real robots show.
     pub fn is_unmistakable(self) -> bool {
         matches!(self, Self::DrivesOff | Self::JointStop | Self::Interpolated)
     }
 
-    /// Whether the event changes the torque during the complete log, so that no interval can be left out.
+    /// Whether the event changes the torque during the complete log, so that no interval can be excluded.
     pub fn is_trend(self) -> bool {
         matches!(self, Self::Drift | Self::WarmUp)
     }
@@ -72,20 +72,21 @@ pub struct LogEvent {
     pub joints: Vec<String>,
     /// Most probable kind.
     pub kind: EventKind,
-    /// A second kind with the same signature.
+    /// A second kind that explains the torque equally well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alternative: Option<EventKind>,
-    /// Whether the evidence is clear. Only clear events are set aside.
+    /// Whether the evidence is clear. Only clear events are excluded from the fit.
     pub clear: bool,
-    /// Whether the torque of the joints in `affected` is left out of the fit; for a held-out log, of the second error
-    /// figure.
+    /// Whether the torque of the joints in `affected` is excluded from the fit; for a held-out log, from its second
+    /// error figure.
     pub set_aside: bool,
-    /// Names of the joints whose torque the event can change, base to tip. The rows of other joints remain in the fit.
+    /// Names of the joints whose torque the event can change, base to tip. The torque of other joints remains in the
+    /// fit.
     pub affected: Vec<String>,
-    /// Unexplained torque in the interval (root mean square) of the joint with the strongest evidence, Nm or N.
+    /// Root mean square of the unexplained torque in the interval, Nm or N, for the joint with the strongest evidence.
     pub unexplained_nm: f64,
-    /// Usual residual torque of the same joint outside of the interval (root mean square), Nm or N.
+    /// Root mean square residual of the same joint outside the interval, Nm or N.
     pub usual_nm: f64,
-    /// Share of the log's duration, from 0 to 1.
+    /// Duration of the event divided by the duration of the log, from 0 to 1.
     pub share: f64,
 }

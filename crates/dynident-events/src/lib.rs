@@ -1,16 +1,17 @@
 //! Intervals of a log that no single model of the robot explains.
 //!
-//! Each log is searched separately, so that different tools or days do not matter. Every joint gets its own linear
+//! Each log is searched separately, so that different tools or days do not matter. Every joint gets a separate linear
 //! model: base parameters of the bodies, offset, friction, drive inertia. The first fit uses the most consistent 60 %
-//! of the log. An interval is an event if the residuals of the complete fit grow clearly when its rows are added:
+//! of the log. An interval is an event if its rows clearly increase the sum of squared errors (SSE) of the fit:
 //!
 //! ```text
 //! excess = (SSE(rest + interval) - SSE(rest)) / bins of the interval
 //! ```
 //!
-//! Unusual motion alone does not increase the residuals of a joint fit, but torque of another origin does. `excess` is
-//! compared with the usual residual variance of the joint in the same state of motion, and with the worst other
-//! interval of the same length, which accounts for model errors and for the number of intervals tested.
+//! Unusual motion alone does not increase the residuals of a joint's fit, but torque of another origin does. `excess`
+//! is compared with the usual residual variance of the joint in the same state of motion. It is also compared with the
+//! largest `excess` of other intervals of the same length, which accounts for model errors and for the number of tested
+//! intervals.
 
 #![forbid(unsafe_code)]
 
@@ -40,14 +41,14 @@ use rows::LogRows;
 use scan::scan;
 use trend::trends;
 
-/// Time around a filled hole that the filter of the positions spoils, s.
+/// Time before and after a filled hole in which the filter of the positions spreads its effect, s.
 const LINE_MARGIN_S: f64 = 0.12;
-/// Bins around an overflow that contain samples of it.
+/// Number of bins before and after an overflow that can contain samples of it.
 const OVERFLOW_BINS: f64 = 1.5;
-/// Minimum number of bins for each parameter of a joint.
+/// Minimum number of bins for each parameter of a joint's model.
 const MIN_BINS_PER_PARAMETER: usize = 3;
 
-/// Events of one log and the residual in which they were found.
+/// Events of one log, and the residuals in which they were found.
 #[derive(Clone, Debug, Default)]
 pub struct EventSearch {
     /// Events in order of time; slow changes last.
@@ -58,7 +59,7 @@ pub struct EventSearch {
     pub time_s: Vec<f64>,
     /// Measured torque of each joint in each bin, Nm or N.
     pub measured: Vec<Vec<f64>>,
-    /// Residual of each joint in each bin with the model of the rest of the log, Nm or N.
+    /// Residual of each joint in each bin, from the model that fits the bins outside all events, Nm or N.
     pub residuals: Vec<Vec<f64>>,
 }
 

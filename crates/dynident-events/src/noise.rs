@@ -1,26 +1,27 @@
-//! Usual residual of each joint in each bin, from the state of motion.
+//! Usual residual of each joint in each bin, as a function of the state of motion.
 
 use crate::rows::{LogRows, median};
 
-/// Velocity below which a joint is near reversal or rest, relative to its root mean square velocity.
+/// Velocity below which a joint is treated as reversing or resting, relative to its root mean square velocity.
 const REVERSAL_SHARE: f64 = 0.15;
-/// Bins before and after a reversal that belong to it.
+/// Number of bins before and after a reversal that are treated as part of it.
 const REVERSAL_BINS: usize = 3;
-/// Share of the dry friction that may be unexplained near reversal and at rest, where its value is not determined.
+/// Share of the dry friction that may remain unexplained near reversal and at rest, where friction is not determined.
 const FRICTION_SHARE: f64 = 0.5;
-/// Friction that grows with the torque of the joint, relative to it; the model has none.
+/// Assumed friction in proportion to the torque of the joint; the model does not contain such friction.
 const LOAD_FRICTION: f64 = 0.08;
-/// Difference in time between motion and torque after their filters, s.
+/// Assumed time difference between motion and torque after their filters, s.
 const TIME_ERROR_S: f64 = 0.01;
 /// Median of the square of a standard normal variable.
 const MEDIAN_SQUARE: f64 = 0.4549;
-/// Smallest level of a state of motion relative to that of all bins (variance).
+/// Smallest residual variance for one state of motion, relative to the variance over all bins.
 const MIN_LEVEL: f64 = 0.5;
-/// Smallest level relative to the joint's torque (root mean square): the model error that remains for a perfect sensor.
+/// Smallest usual residual relative to the joint's torque (both root mean square): model error that remains even with a
+/// perfect sensor.
 const MIN_MODEL_ERROR: f64 = 0.002;
 
-/// Variance of each joint's residual in each bin: the robust variance over bins of the same state of motion (near
-/// reversal, slow, fast), plus the dry friction near reversal.
+/// Variance of each joint's residual in each bin. It is a robust variance over all bins in the same state of motion
+/// (near reversal, slow, fast), plus a share of the dry friction near reversal.
 pub(crate) fn usual_variance(rows: &LogRows, residuals: &[Vec<f64>], friction: &[f64], kept: &[bool]) -> Vec<Vec<f64>> {
     let moving: Vec<bool> = (0..rows.len()).map(|bin| rows.is_moving(bin)).collect();
     let of_joint = |joint: usize| -> Vec<f64> {
@@ -33,7 +34,7 @@ pub(crate) fn usual_variance(rows: &LogRows, residuals: &[Vec<f64>], friction: &
         let floor = (MIN_MODEL_ERROR * torque).powi(2).max(f64::MIN_POSITIVE);
         let all = robust(&|_| true).max(floor);
         let level = |state: usize| robust(&|bin| states[bin] == state).max(MIN_LEVEL * all);
-        // While the whole robot rests, any torque is possible if the drives are off.
+        // Bins in which the whole robot rests are excluded: if the drives are off, any torque is possible there.
         let near = robust(&|bin| states[bin] == 0 && moving[bin]).max(MIN_LEVEL * all);
         let levels = [near, level(1), level(2)];
         let near_reversal = (FRICTION_SHARE * friction[joint]).powi(2);

@@ -1,4 +1,4 @@
-//! Normal equations of one joint.
+//! Normal equations of the least-squares fit of one joint.
 
 use crate::rows::LogRows;
 use core::ops::Range;
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 /// Regularisation relative to the mean diagonal; columns have similar scales.
 const RIDGE: f64 = 1e-7;
 
-/// `[W τ]ᵀ [W τ]` over some bins of one joint.
+/// Matrix `[W τ]ᵀ [W τ]` over some bins of one joint, with regressor W and torque τ.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
     /// Number of bins.
@@ -20,7 +20,7 @@ impl Normal {
         Self { bins: 0.0, gram: DMatrix::zeros(width + 1, width + 1) }
     }
 
-    /// Sums over the usable bins of a range that are not excluded, with `further` columns for each bin.
+    /// Sums over a range of bins, without unusable and excluded bins. `further` appends columns to each bin.
     pub(crate) fn of_range(
         rows: &LogRows,
         joint: usize,
@@ -71,7 +71,7 @@ impl Normal {
         Some(matrix.cholesky()?.solve(&right))
     }
 
-    /// Sum of squared residuals with the given parameters.
+    /// Sum of squared residuals with these parameters.
     pub(crate) fn squares(&self, theta: &DVector<f64>) -> f64 {
         let width = theta.len();
         let product = self.gram.view((0, 0), (width, width)) * theta;

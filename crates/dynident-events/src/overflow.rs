@@ -1,30 +1,30 @@
-//! Overflow of the number format of a torque: its value jumps from one end of its range to the other.
+//! Overflow of the number format of a torque: the value jumps from one end of its range to the other.
 
 use crate::normal::Normal;
 use crate::rows::{LogRows, TorquePiece, median};
 
-/// Distance of both ends of a jump from the ends of the range, relative to the range.
+/// Maximum distance of both ends of a jump from the ends of the torque's range, relative to the range.
 const END_SHARE: f64 = 0.15;
-/// Maximum duration of a jump, s; at least one step of the log. The cleaning of outliers can spread it.
+/// Maximum duration of a jump, s, but at least one sample. The removal of outliers can spread a jump.
 const MAX_JUMP_S: f64 = 0.02;
-/// Minimum mean square residual of a fit to all parts, relative to a fit to the normal parts. Dry friction also jumps,
-/// at a reversal, but one model explains both directions.
+/// Minimum ratio of two mean square residuals: fit to all parts of the log, and fit to the parts without overflow. Dry
+/// friction also jumps at a reversal, but one model explains both directions, so the ratio stays small.
 const MIN_RESIDUAL_RATIO: f64 = 10.0;
-/// Shortest overflow and shortest normal part between two, bins.
+/// Minimum duration of an overflow, and of a normal part between two overflows, bins.
 const MIN_BINS: usize = 2;
-/// Jumps up to this distance are noise at the limit of the range, bins.
+/// Jumps that follow each other within this time are treated as noise at the limit of the range, bins.
 const MAX_NOISE_BINS: f64 = 4.0;
-/// Mean residual of an overflow relative to the jump.
+/// Smallest and largest mean residual of an overflow, relative to the size of the jump.
 const JUMP_RATIO: [f64; 2] = [0.6, 1.4];
-/// Rounds of fit and assignment of the parts.
+/// Number of rounds that alternate between a fit and the classification of parts as normal or overflowed.
 const ROUNDS: usize = 5;
-/// Maximum share of the bins of a joint in overflow.
+/// Maximum share of a joint's bins with overflow.
 const MAX_SHARE: f64 = 0.5;
 
-/// Overflow of the torque of one joint.
+/// Overflow of the torque number of one joint.
 pub(crate) struct Overflow {
     pub(crate) joint: usize,
-    /// Start and end of each interval, s.
+    /// Start and end of each interval with overflow, s.
     pub(crate) times_s: Vec<[f64; 2]>,
     /// Size of the jump, Nm or N.
     pub(crate) jump_nm: f64,
@@ -40,8 +40,8 @@ struct Part {
     is_wrapped: bool,
 }
 
-/// Joints whose torque jumps to the other end of its range and back, if the model of the other parts has a residual of
-/// one jump in between.
+/// Joints whose torque jumps to the other end of its range and back. In between, the residual of a model that was
+/// fitted to the other parts must equal the size of the jump.
 pub(crate) fn overflows(rows: &LogRows) -> Vec<Overflow> {
     (0..rows.joints()).filter_map(|joint| overflow(rows, joint)).collect()
 }
@@ -83,7 +83,7 @@ fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
         return None;
     }
     let mut times_s: Vec<[f64; 2]> = parts.iter().filter(|part| part.is_wrapped).map(|part| part.times_s).collect();
-    // Noise at the limit of the range jumps several times.
+    // Noise at the limit of the range can cause several jumps in a short time.
     let near_s = MAX_NOISE_BINS * rows.bin_s;
     times_s.extend(jumps.windows(2).map(|two| [two[0].0, two[1].0]).filter(|[from, to]| to - from <= near_s));
     times_s.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -97,8 +97,8 @@ fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
     Some(Overflow { joint, times_s: merged, jump_nm, usual_nm })
 }
 
-/// Parts of the log between two jumps of a joint's torque, and time and size of the jumps. Parts of less than
-/// [`MIN_BINS`] bins are left out. A joint that is at one end of the range after an odd number of jumps is wrapped.
+/// Parts of the log between two jumps of a joint's torque, and time and size of each jump. Parts of less than
+/// [`MIN_BINS`] bins are omitted. After an odd number of jumps, a torque at one end of the range has overflowed.
 fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
     let all = || rows.samples.iter().flat_map(|piece| piece.tau[joint].iter().copied());
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), tau| (low.min(tau), high.max(tau)));
@@ -118,7 +118,7 @@ fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
             };
             let bins: Vec<usize> = (0..rows.len()).filter(is_inside).collect();
             let moving = bins.iter().filter(|&&bin| rows.is_moving(bin)).count();
-            // The parts at rest are for the test of drives that are off.
+            // Parts at rest are omitted here; the test for drives that are off examines them.
             if bins.len() >= MIN_BINS && 2 * moving >= bins.len() {
                 parts.push(Part { times_s, bins, is_wrapped: count != 0 });
             }
@@ -126,7 +126,7 @@ fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
             from = to;
         }
     }
-    // The longer state is the normal one.
+    // The state (overflowed or not) that lasts longer is treated as normal.
     let length = |is_wrapped: bool| -> usize {
         parts.iter().filter(|part| part.is_wrapped == is_wrapped).map(|part| part.bins.len()).sum()
     };
@@ -138,7 +138,7 @@ fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
     (parts, sizes)
 }
 
-/// First sample after each jump from one end of the range to the other, and the change of the torque.
+/// First sample after each jump from one end of the range (`low`, `high`) to the other, and the change of the torque.
 fn jumps(piece: &TorquePiece, joint: usize, [low, high]: [f64; 2]) -> Vec<(usize, f64)> {
     let near = END_SHARE * (high - low);
     let longest = ((MAX_JUMP_S * piece.rate_hz) as usize).max(1);

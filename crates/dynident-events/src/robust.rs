@@ -1,30 +1,31 @@
-//! Fits of all joints, and a robust first fit by trimmed blocks.
+//! Fits of all joints, and a robust first fit that excludes the least consistent blocks of the log.
 
 use crate::normal::Normal;
 use crate::rows::{DRIVE_COLUMNS, LogRows, median};
 use core::ops::Range;
 use nalgebra::DVector;
 
-/// Length of a block, s, and maximum number of blocks.
+/// Length of a block, s; blocks are longer if there would be more than [`MAX_BLOCKS`].
 const BLOCK_S: f64 = 0.4;
+/// Maximum number of blocks.
 const MAX_BLOCKS: usize = 100;
-/// Share of blocks in the trimmed fit.
+/// Share of the blocks that the robust fit uses.
 const KEPT_SHARE: f64 = 0.6;
-/// Concentration steps from each start.
+/// Number of iterations (concentration steps) from each start.
 const STEPS: usize = 4;
-/// Limit of a block's relative square error, so that one joint does not decide alone.
+/// Limit on a block's relative squared error, so that one joint alone does not decide whether the block is used.
 const MAX_BLOCK_ERROR: f64 = 50.0;
 
-/// Parameters of all joints.
+/// Model parameters of all joints.
 pub(crate) type Fit = Vec<DVector<f64>>;
 
-/// Sums over blocks of bins.
+/// Normal equations of each block of bins.
 pub(crate) struct Blocks<'a> {
     pub(crate) rows: &'a LogRows,
     ranges: Vec<Range<usize>>,
-    /// By joint and block.
+    /// Normal equations by joint and block.
     normals: Vec<Vec<Normal>>,
-    /// Whether a joint moves in a block.
+    /// Whether any joint moves in a block.
     moving: Vec<bool>,
 }
 
@@ -43,7 +44,7 @@ impl<'a> Blocks<'a> {
         Self { rows, ranges, normals, moving }
     }
 
-    /// Fit to all bins with `is_kept`; `None` if too few rows remain.
+    /// Fit to the blocks that `kept` selects; `None` if too few rows remain.
     pub(crate) fn fit(&self, kept: &[bool]) -> Option<(Vec<Normal>, Fit)> {
         let mut sums = Vec::new();
         for joint in 0..self.rows.joints() {
@@ -62,7 +63,7 @@ impl<'a> Blocks<'a> {
         fit.map(|fit| (sums, fit))
     }
 
-    /// The fit to the most consistent [`KEPT_SHARE`] of the blocks (least trimmed squares with concentration steps,
+    /// Fit to the most consistent [`KEPT_SHARE`] of the blocks (least trimmed squares with concentration steps,
     /// Rousseeuw and Van Driessen, 2006).
     pub(crate) fn trimmed_fit(&self) -> Option<Fit> {
         let blocks = self.ranges.len();
@@ -94,7 +95,8 @@ impl<'a> Blocks<'a> {
         best.map(|(_, fit)| fit)
     }
 
-    /// One concentration step: objective and fit of the kept blocks, and the blocks to keep next.
+    /// One concentration step: objective and fit of the selected blocks, and the blocks with the smallest errors of
+    /// this fit.
     fn concentrated(&self, kept: &[bool]) -> Option<(f64, Fit, Vec<bool>)> {
         let blocks = self.ranges.len();
         let mut scores = vec![0.0; blocks];
@@ -112,7 +114,8 @@ impl<'a> Blocks<'a> {
             logs.push((errors, level));
             fit.push(theta);
         }
-        // A robot at rest fits any model: such blocks do not decide, unless most of the log is at rest.
+        // Any model fits a robot at rest. Blocks at rest are therefore not used for the selection, unless most of the
+        // log is at rest.
         let moving = self.moving.iter().filter(|moving| **moving).count();
         if 4 * moving >= blocks {
             for (score, moving) in scores.iter_mut().zip(&self.moving) {
@@ -141,7 +144,7 @@ pub(crate) fn residuals(rows: &LogRows, fit: &Fit) -> Vec<Vec<f64>> {
     (0..rows.joints()).map(of_joint).collect()
 }
 
-/// Dry friction of each joint in the fit, Nm (N): the step of the torque at the wide step's velocity.
+/// Dry friction of each joint in the fit, Nm (N), evaluated at the velocity of the wider of the two friction functions.
 pub(crate) fn dry_friction(rows: &LogRows, fit: &Fit) -> Vec<f64> {
     let of_joint = |joint: usize| {
         let drive = rows.width[joint] - DRIVE_COLUMNS;

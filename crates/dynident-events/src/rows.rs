@@ -5,30 +5,30 @@ use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 use dynident_rows::{LogError, LogPass, PANEL_SAMPLES};
 
-/// Length of a bin, s. A start or an end is known to about two bins.
+/// Length of a bin, s. The start and end of an event are accurate to about two bins.
 const BIN_S: f64 = 0.04;
-/// Samples of the regressor in a bin.
+/// Number of samples at which the regressor is evaluated in a bin.
 const SAMPLES_PER_BIN: usize = 4;
 /// Maximum number of bins; longer logs have longer bins.
 const MAX_BINS: f64 = 20_000.0;
-/// Velocity of the narrow friction step relative to the root mean square velocity of the joint.
+/// Velocity scale of the narrow friction function, relative to the root mean square velocity of the joint.
 const STEP_SHARE: f64 = 0.03;
-/// Velocity of a joint at rest relative to its root mean square velocity.
+/// Velocity below which a joint is at rest, relative to its root mean square velocity.
 const REST_SHARE: f64 = 0.1;
-/// Ratio of the wide friction step to the narrow step.
+/// Ratio of the velocity scales of the wide and the narrow friction function.
 const WIDE_STEP: f64 = 6.0;
-/// Number of columns that are added to each joint: offset, two friction steps, two powers of velocity, drive inertia,
-/// friction that grows with the torque.
+/// Number of columns that are added for each joint: offset, two smoothed signs of the velocity (narrow and wide), two
+/// powers of velocity, drive inertia, friction that grows with the torque.
 pub(crate) const DRIVE_COLUMNS: usize = 7;
 
-/// One log in bins. Vectors of joints in the order of the model.
+/// One log, averaged over bins. Vectors of joints are in the order of the model.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LogRows {
     /// Length of a bin, s.
     pub(crate) bin_s: f64,
     /// Centre of each bin, s after the first data row.
     pub(crate) time_s: Vec<f64>,
-    /// Number of the uninterrupted piece of each bin.
+    /// Index of the uninterrupted piece of the log that contains each bin.
     pub(crate) piece: Vec<usize>,
     /// Whether the motion of the bin is reliable.
     pub(crate) usable: Vec<bool>,
@@ -38,22 +38,22 @@ pub(crate) struct LogRows {
     pub(crate) dq: Vec<Vec<f64>>,
     /// Torques.
     pub(crate) tau: Vec<Vec<f64>>,
-    /// Columns of each joint's regression, row-major: base parameters, then [`DRIVE_COLUMNS`]. Each column has the root
-    /// mean square 1.
+    /// Columns of each joint's regression, row-major: base parameters, then [`DRIVE_COLUMNS`] further columns. Each
+    /// column is scaled to a root mean square of 1.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Number of columns of each joint.
     pub(crate) width: Vec<usize>,
-    /// Velocity of the narrow friction step of each joint.
+    /// Velocity scale of the narrow friction function of each joint.
     pub(crate) step: Vec<f64>,
-    /// Velocity of each joint below which it rests.
+    /// Velocity of each joint below which the joint is at rest.
     pub(crate) rest: Vec<f64>,
-    /// Root mean square of each joint's friction and inertia columns before scaling.
+    /// Root mean square of each joint's [`DRIVE_COLUMNS`] columns before scaling.
     pub(crate) drive_scale: Vec<[f64; DRIVE_COLUMNS]>,
-    /// Torque samples, joint-major in pieces, for the search of straight lines and jumps.
+    /// Torque samples by piece and joint, for the searches for straight lines and jumps.
     pub(crate) samples: Vec<TorquePiece>,
 }
 
-/// Torque of one uninterrupted piece.
+/// Torque samples of one uninterrupted piece of the log.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TorquePiece {
     pub(crate) first_s: f64,
@@ -61,7 +61,8 @@ pub(crate) struct TorquePiece {
     pub(crate) tau: Vec<Vec<f64>>,
 }
 
-/// Columns that do not depend on the order of samples or on other quantities.
+/// Columns of the bodies, of torques declared by `[[torque]]` and of couplings. Friction and drives of the joints are
+/// represented by [`DRIVE_COLUMNS`] further columns instead.
 pub(crate) fn without_history(robot: &ParametricModel) -> Option<PanelLayout> {
     let is_kept = |column: &Column| match column {
         Column::Body { .. } => true,
@@ -73,7 +74,7 @@ pub(crate) fn without_history(robot: &ParametricModel) -> Option<PanelLayout> {
 
 #[derive(Default)]
 struct Collected {
-    /// Sub-samples, one vector for each joint.
+    /// Positions at the samples within a bin at which the regressor is evaluated, one vector for each joint.
     q: Vec<Vec<f64>>,
     dq: Vec<Vec<f64>>,
     ddq: Vec<Vec<f64>>,
@@ -81,7 +82,7 @@ struct Collected {
 }
 
 impl LogRows {
-    /// Reads the motion of a log. `None` for a log without rows.
+    /// Reads a log and averages it over bins. `None` for a log without rows.
     pub(crate) fn read(pass: &LogPass<'_>, robot: &ParametricModel) -> Result<Option<Self>, LogError> {
         let model = robot.model();
         let places = pass.recording.joint_indices(model)?;
@@ -163,7 +164,7 @@ impl LogRows {
         }
     }
 
-    /// Removes an incomplete last bin of a piece.
+    /// Removes the last bin of a piece if it is incomplete.
     fn close(&mut self, in_bin: usize, per_bin: usize, of: &mut Collected) {
         if in_bin == 0 || in_bin == per_bin {
             return;
@@ -237,7 +238,7 @@ impl LogRows {
         self.scale_columns();
     }
 
-    /// Gives every column the root mean square 1. Bins with values that are not finite become unusable.
+    /// Scales every column to a root mean square of 1. Marks bins with values that are not finite as unusable.
     fn scale_columns(&mut self) {
         let bins = self.time_s.len();
         for joint in 0..self.q.len() {
@@ -270,7 +271,7 @@ impl LogRows {
         }
     }
 
-    /// Makes the bins of these intervals (s) unusable, and those up to `margin_s` before and after them.
+    /// Marks the bins in these intervals (s) as unusable, and the bins up to `margin_s` before and after them.
     pub(crate) fn leave_out(&mut self, intervals: &[[f64; 2]], margin_s: f64) {
         for (usable, time_s) in self.usable.iter_mut().zip(&self.time_s) {
             let is_near = |[from, to]: &[f64; 2]| *time_s > from - margin_s && *time_s < to + margin_s;
@@ -299,8 +300,8 @@ impl LogRows {
     }
 }
 
-/// Offset, narrow and wide friction step, velocity, its signed square, acceleration, friction that grows with the
-/// torque.
+/// Values of the columns for offset, narrow and wide smoothed sign of the velocity, velocity, signed square of the
+/// velocity, acceleration, and friction that grows with the torque.
 fn drive_columns([dq, ddq]: [f64; 2], tau: f64, step: f64) -> [f64; DRIVE_COLUMNS] {
     let wide = (dq / (WIDE_STEP * step)).tanh();
     [1.0, (dq / step).tanh(), wide, dq, dq * dq.abs(), ddq, tau.abs() * wide]

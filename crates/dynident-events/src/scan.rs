@@ -1,4 +1,4 @@
-//! Search for intervals that the model of the other bins does not explain.
+//! Search for intervals whose torque a model of the other bins does not explain.
 
 use crate::noise::usual_variance;
 use crate::normal::Normal;
@@ -7,69 +7,72 @@ use crate::rows::{LogRows, rms};
 use crate::settings::EventSettings;
 use core::ops::Range;
 
-/// Relative square residual below which a bin does not belong to an event.
+/// Relative squared residual that a bin must exceed to increase the sum of an interval.
 const BIN_RATIO: f64 = 9.0;
-/// Largest relative square residual of a bin in the search: two events do not join over a longer normal part.
+/// Limit on the relative squared residual of a bin, so that two events with a longer normal part between them are not
+/// joined.
 const MAX_BIN_RATIO: f64 = 18.0;
-/// Loss of a bin without reliable motion or torque in the search.
+/// Amount by which a bin without reliable motion or torque reduces the sum of an interval.
 const UNUSABLE_LOSS: f64 = 3.0;
-/// Minimum sum of contributions of an interval.
+/// Minimum sum of relative squared residuals (above [`BIN_RATIO`]) of an interval.
 const MIN_SUM: f64 = 20.0;
 /// Minimum number of bins of an interval.
 const MIN_BINS: usize = 2;
-/// Intervals with a smaller distance are one event, s.
+/// Maximum distance between intervals that are merged into one event, s.
 const MERGE_S: f64 = 0.3;
-/// Torque of a joint relative to the largest of all joints below which its own torque is not the reference.
+/// Smallest torque of a joint relative to the largest of all joints (root mean square) that is used as its reference.
+/// For joints with less torque, this share of the largest torque is used.
 const MIN_TORQUE_SHARE: f64 = 0.1;
-/// Ratio of predicted to measured torque (squares) of a robot without drives, and minimum predicted torque relative to
-/// its usual residual (squares).
+/// Minimum ratio of predicted to measured torque (squares) if the drives are off.
 const OFF_RATIO: f64 = 10.0;
+/// Minimum predicted torque for such a comparison, relative to the usual residual of the joint (squares).
 const OFF_PREDICTED: f64 = 16.0;
-/// Torque of each joint without drives relative to its root mean square, and minimum duration, s.
+/// Maximum torque of each joint if the drives are off, relative to its root mean square torque in the log.
 const OFF_TORQUE_SHARE: f64 = 0.1;
+/// Minimum duration of a rest with the drives off, s.
 const MIN_OFF_S: f64 = 0.3;
-/// Gap in a rest without torque, for noise.
+/// Longest interruption by noise, bins, of a rest without torque.
 const OFF_GAP_BINS: usize = 2;
-/// Share of the bins of a range in which a joint at rest rests.
+/// Minimum share of the bins of a range in which a joint must rest to be treated as at rest.
 const MIN_REST_BINS: f64 = 0.75;
-/// Distance from the end of the travel in the log at a stop, relative to the travel, and minimum mean torque at a stop
-/// relative to the usual residual (squares).
+/// Maximum distance of a joint at a stop from the end of its range in the log, relative to the range.
 const STOP_SHARE: f64 = 0.03;
-/// Travel of another joint meanwhile, relative to its travel in the log.
+/// Minimum travel of another joint during the stop, relative to its range in the log.
 const STOP_TRAVEL: f64 = 0.1;
+/// Minimum mean residual torque at a stop, relative to the usual residual of the joint (squares).
 const STOP_RATIO: f64 = 9.0;
-/// Rounds of search and refit.
+/// Number of rounds that alternate between search and fit.
 const ROUNDS: usize = 4;
 /// Maximum number of intervals.
 const MAX_INTERVALS: usize = 12;
 
-/// An interval with its evidence.
+/// An interval with unexplained torque, and the evidence.
 #[derive(Clone, Debug)]
 pub(crate) struct Interval {
     pub(crate) bins: Range<usize>,
-    /// Mean square of unexplained torque of each joint.
+    /// Mean square of the unexplained torque of each joint.
     pub(crate) excess: Vec<f64>,
-    /// The same, relative to the usual variance.
+    /// Mean square of the unexplained torque of each joint, relative to the usual residual variance.
     pub(crate) ratio: Vec<f64>,
-    /// The same, relative to the worst other interval of this length.
+    /// Mean square of the unexplained torque of each joint, relative to the worst other interval of this length.
     pub(crate) prominence: Vec<f64>,
-    /// The same (root), relative to the torque of the joint.
+    /// Root mean square of the unexplained torque of each joint, relative to the torque of the joint.
     pub(crate) effect: Vec<f64>,
     /// Joint with the strongest evidence.
     pub(crate) strongest: usize,
-    /// Whether all joints rest without the torque that carries their weight.
+    /// Whether all joints rest and the torque that carries their weight is missing.
     pub(crate) is_off: bool,
-    /// Whether a joint rests at the end of its travel with more torque than friction holds, while others move.
+    /// Whether one joint rests at the end of its range with more torque than its friction, while other joints move.
     pub(crate) is_stop: bool,
     pub(crate) is_clear: bool,
 }
 
-/// Intervals, and the model of the other bins.
+/// Result of the search: intervals, and the model of the bins outside of them.
 pub(crate) struct Scan {
     pub(crate) intervals: Vec<Interval>,
     pub(crate) residuals: Vec<Vec<f64>>,
     pub(crate) variance: Vec<Vec<f64>>,
-    /// Bins outside of all intervals.
+    /// Whether each bin is outside of all intervals.
     pub(crate) kept: Vec<bool>,
 }
 
@@ -93,7 +96,7 @@ pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
         found = next;
         fit = blocks.fit(&kept)?.1;
     }
-    // An interval that a joint fit explains is unusual motion and returns to the fit.
+    // If a joint's fit can explain an interval, it is unusual motion and becomes part of the fit again.
     loop {
         let (sums, refit) = blocks.fit(&kept)?;
         let left = residuals(rows, &refit);
@@ -158,8 +161,8 @@ fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<R
     merged
 }
 
-/// Ranges of at least [`MIN_OFF_S`] in which all joints rest with little torque: without drives, or in a posture that
-/// needs none.
+/// Ranges of at least [`MIN_OFF_S`] in which all joints rest with little torque: the drives are off, or the posture
+/// requires no torque.
 fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
     let is_quiet = quiet(rows);
     let mut found: Vec<Range<usize>> = Vec::new();
@@ -173,7 +176,7 @@ fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
     found
 }
 
-/// Whether all torques of a bin are small.
+/// For each bin, whether the torques of all joints are small.
 fn quiet(rows: &LogRows) -> Vec<bool> {
     let largest = rows.tau.iter().map(|tau| rms(tau)).fold(0.0, f64::max);
     let scale = |tau: &Vec<f64>| OFF_TORQUE_SHARE * rms(tau).max(MIN_TORQUE_SHARE * largest);
@@ -182,8 +185,9 @@ fn quiet(rows: &LogRows) -> Vec<bool> {
     (0..rows.len()).map(is_quiet).collect()
 }
 
-/// The longest rest without torque inside a range, and the same with the adjacent bins without torque: brakes stop a
-/// robot without torque, and the torque returns before the motion.
+/// Two ranges: the longest rest without torque inside `range`, and this rest extended by the adjacent bins without
+/// torque. The extension is necessary because brakes stop the robot after the torque ends, and the torque returns
+/// before the motion.
 pub(crate) fn off_ranges(rows: &LogRows, range: &Range<usize>) -> Option<[Range<usize>; 2]> {
     let inside = without_torque(rows).into_iter().filter(|off| off.start < range.end && off.end > range.start);
     let at_rest = inside.max_by_key(Range::len)?;
@@ -193,7 +197,7 @@ pub(crate) fn off_ranges(rows: &LogRows, range: &Range<usize>) -> Option<[Range<
     Some([at_rest, from..to])
 }
 
-/// The interval with the largest sum.
+/// The interval with the largest sum of `gains`, and this sum.
 fn best_interval(gains: &[f64]) -> Option<(Range<usize>, f64)> {
     let (mut sum, mut from) = (0.0, 0);
     let mut best: Option<(Range<usize>, f64)> = None;
@@ -209,7 +213,8 @@ fn best_interval(gains: &[f64]) -> Option<(Range<usize>, f64)> {
     best
 }
 
-/// Evidence of one interval: the increase of the squared residuals if its bins are added to the fit of the others.
+/// Evidence for one interval: the increase of the squared residuals if the bins of the interval are added to the fit of
+/// the other bins.
 fn judged(
     rows: &LogRows,
     range: &Range<usize>,
@@ -240,7 +245,7 @@ fn judged(
         both.add(&inside);
         let increase = both.squares(&both.solution()?) - sums[joint].squares(&fit[joint]);
         let excess = (increase / inside.bins).max(0.0);
-        // Bins with a well-known torque count most.
+        // Bins with a small usual residual have the largest weight.
         let usual = range.len() as f64 / variance[joint][range.clone()].iter().map(|one| one.recip()).sum::<f64>();
         one.excess[joint] = excess;
         one.ratio[joint] = excess / usual;
@@ -260,7 +265,7 @@ fn judged(
     }
     let share = range.len() as f64 / rows.len() as f64;
     let is_evident = one.passes(settings.clear_ratio, settings.clear_prominence, settings.clear_effect);
-    // A robot without drives is never the normal part.
+    // A robot whose drives are off is never the normal state, for any share of the log.
     one.is_clear = one.is_off || (one.is_stop || is_evident) && share <= settings.max_share;
     Some(one)
 }
@@ -271,7 +276,7 @@ pub(crate) fn rests(rows: &LogRows, range: &Range<usize>, joint: usize) -> bool 
     still as f64 >= MIN_REST_BINS * range.len() as f64
 }
 
-/// Whether another joint moves clearly while one joint rests.
+/// Whether another joint moves clearly while joint `resting` is at rest.
 fn others_move(rows: &LogRows, range: &Range<usize>, resting: usize) -> bool {
     let still = || range.clone().filter(|&bin| rows.dq[resting][bin].abs() <= rows.rest[resting]);
     let travel = |q: &mut dyn Iterator<Item = f64>| {
@@ -285,13 +290,13 @@ fn others_move(rows: &LogRows, range: &Range<usize>, resting: usize) -> bool {
     (0..rows.joints()).any(|joint| joint != resting && moves(joint))
 }
 
-/// Root mean square residual in a range relative to the torque of the joint.
+/// Root mean square residual of a joint in a range, relative to the torque of the joint.
 fn mean_effect(rows: &LogRows, range: &Range<usize>, left: &[f64], joint: usize) -> f64 {
     rms(&left[range.clone()]) / rms(&rows.tau[joint]).max(f64::MIN_POSITIVE)
 }
 
-/// Whether one joint rests at the end of its travel with a residual of one sign that is larger than its friction. Its
-/// free parameters could explain such a torque in one posture, so this is tested separately.
+/// Whether one joint rests at the end of its range with a residual of constant sign that is larger than its friction.
+/// The free parameters of the joint could explain such a torque in a single posture, so this is tested separately.
 fn is_stop(rows: &LogRows, range: &Range<usize>, joint: usize, left: &[f64], variance: &[f64]) -> bool {
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
     let q = &rows.q[joint];
@@ -301,8 +306,8 @@ fn is_stop(rows: &LogRows, range: &Range<usize>, joint: usize, left: &[f64], var
     is_at_end && rests(rows, range, joint) && mean(left).powi(2) > STOP_RATIO * mean(variance)
 }
 
-/// Whether all joints rest, and the torque that carries the weight is missing at some joint while all torques are
-/// small. One posture alone hardly changes a fit, so this is tested separately.
+/// Whether all joints rest with small torques, and some joint lacks the torque that carries the weight. A single
+/// posture hardly changes a fit, so this is tested separately.
 fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[Vec<f64>]) -> bool {
     let joints = rows.joints();
     if !(0..joints).all(|joint| rests(rows, range, joint)) {
@@ -322,7 +327,7 @@ fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[V
     is_missing && predicted > OFF_RATIO * measured
 }
 
-/// Largest mean square residual of the kept bins over windows of this length.
+/// Largest mean square residual over windows of `length` bins that are in the fit.
 fn worst_window(rows: &LogRows, left: &[f64], kept: &[bool], length: usize) -> f64 {
     let square = |bin: usize| if kept[bin] && rows.usable[bin] { left[bin].powi(2) } else { 0.0 };
     let length = length.min(rows.len());

@@ -4,20 +4,20 @@ use crate::kind::EventKind;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// What happens with events.
+/// Treatment of events.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EventChoice {
-    /// Clear events whose signature no normal operation has are set aside ([`EventKind::is_unmistakable`]); all events
-    /// are reported.
+    /// Excludes clear events that normal operation cannot cause ([`EventKind::is_unmistakable`]) from the fit; reports
+    /// all events.
     #[default]
     Auto,
-    /// Clear events of every kind are set aside; all events are reported.
+    /// Excludes clear events of every kind from the fit; reports all events.
     SetAside,
-    /// All events are reported; no row is left out.
+    /// Reports all events and excludes no rows.
     Warn,
-    /// No search.
+    /// No search for events.
     Off,
 }
 
@@ -25,29 +25,31 @@ pub enum EventChoice {
 /// (`cargo run --release -p dynident-identification --example events`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct EventSettings {
-    /// What happens with events.
+    /// Treatment of events.
     pub choice: EventChoice,
     /// Minimum mean square of unexplained torque in an interval, relative to the usual residual of the joint in the
     /// same state of motion, for a clear event.
     pub clear_ratio: f64,
-    /// The same for a warning.
+    /// Minimum of the same ratio as [`clear_ratio`](Self::clear_ratio), for a warning.
     pub warn_ratio: f64,
     /// Minimum mean square of unexplained torque, relative to the worst interval of the same length in the rest of the
-    /// log, for a clear event. The worst of all other intervals accounts for the number of intervals tested.
+    /// log, for a clear event. The comparison with the worst of all other intervals accounts for the number of tested
+    /// intervals.
     pub clear_prominence: f64,
-    /// The same for a warning.
+    /// Minimum of the same ratio as [`clear_prominence`](Self::clear_prominence), for a warning.
     pub warn_prominence: f64,
     /// Minimum unexplained torque relative to the torque of the joint (both root mean square), for a clear event.
-    /// Smaller residuals can be friction at creeping motion or errors of a torque sensor; they do little harm to a fit.
+    /// Smaller residuals can result from friction in very slow motion or errors of a torque sensor; they change a fit
+    /// little.
     pub clear_effect: f64,
-    /// The same for a warning.
+    /// Minimum of the same ratio as [`clear_effect`](Self::clear_effect), for a warning.
     pub min_effect: f64,
-    /// Maximum share of a log that is set aside automatically, in addition to rests without drives. With more, it is
-    /// not clear which part of the log is normal.
+    /// Maximum share of a log that is excluded automatically; rests with the drives off are not included in this share.
+    /// If the share is larger, it is not clear which part of the log is normal.
     pub max_share: f64,
     /// Minimum duration of a log that is searched, s.
     pub min_duration_s: f64,
-    /// Minimum share of a joint's squared residual that a slow change explains, for a warning.
+    /// Minimum share of a joint's squared residual that a slow change must explain, for a warning.
     pub min_trend_share: f64,
     /// Minimum size of a slow change relative to the torque of the joint (both root mean square), for a warning.
     pub min_trend_effect: f64,
@@ -72,7 +74,7 @@ impl Default for EventSettings {
 }
 
 impl EventChoice {
-    /// Whether a clear event of this kind is set aside.
+    /// Whether a clear event of this kind is excluded from the fit.
     pub fn sets_aside(self, kind: EventKind) -> bool {
         match self {
             Self::Auto => kind.is_unmistakable(),
@@ -89,11 +91,11 @@ impl EventChoice {
 pub struct EventSettingsError {
     /// Name of the setting.
     pub name: &'static str,
-    /// Its value.
+    /// Value of the setting.
     pub value: f64,
-    /// Minimum.
+    /// Smallest permitted value.
     pub low: f64,
-    /// Maximum.
+    /// Largest permitted value.
     pub high: f64,
 }
 

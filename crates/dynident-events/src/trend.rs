@@ -11,20 +11,22 @@ use crate::settings::EventSettings;
 pub(crate) struct Trend {
     pub(crate) joint: usize,
     pub(crate) kind: EventKind,
-    /// Root mean square of the change, Nm or N.
+    /// Root mean square of the torque of the change, Nm or N.
     pub(crate) size_nm: f64,
-    /// Root mean square of the residual with the change in the model, Nm or N.
+    /// Root mean square of the residual if the model includes the change, Nm or N.
     pub(crate) left_nm: f64,
-    /// First bin after a sudden change of the offset, and whether a step explains it clearly better than a slow change.
+    /// First bin after a sudden change of the offset; `None` if a slow change explains the residual about as well.
     pub(crate) step: Option<usize>,
 }
 
-/// Residual of a step relative to that of a slow change (squares), below which the change was sudden.
+/// Maximum residual of a model with a sudden change, relative to a model with a slow change (squares), for a sudden
+/// change.
 const MAX_STEP_RATIO: f64 = 0.7;
-/// Number of times at which a sudden change is tried first.
+/// Number of times that are first tried for a sudden change.
 const STEP_TIMES: usize = 40;
 
-/// Mean square residual and first bin of the best sudden change of one joint's offset.
+/// Mean square residual of a model with the best sudden change of one joint's offset, and the first bin after the
+/// change.
 fn best_step(rows: &LogRows, joint: usize, kept: &[bool]) -> Option<(f64, usize)> {
     let bins = rows.len();
     let at = |first: usize| {
@@ -42,7 +44,7 @@ fn best_step(rows: &LogRows, joint: usize, kept: &[bool]) -> Option<(f64, usize)
     near.filter_map(at).fold(Some(coarse), least)
 }
 
-/// Slow changes that explain at least [`EventSettings::min_trend_share`] of a joint's residual.
+/// Slow changes that explain at least [`EventSettings::min_trend_share`] of a joint's squared residual.
 pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> Vec<Trend> {
     let bins = rows.len();
     let place = |bin: usize| 2.0 * bin as f64 / (bins - 1).max(1) as f64 - 1.0;

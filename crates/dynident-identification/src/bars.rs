@@ -1,8 +1,8 @@
-//! Error bars of an estimate as a sum of named terms.
+//! Error bars of an estimate, as a sum of terms for the sources of error.
 //!
-//! An estimator returns the covariance Σ of its values that follows from the residuals. Every other source of error is
-//! a separate term: a covariance `F_k` over the same columns, with the name of its source. The terms are independent of
-//! each other and of the noise, so the total covariance is `Σ + Σ_k F_k`. Only [`ErrorBars::total`] adds them.
+//! An estimator returns the covariance Σ of its values that follows from the residuals. Every other source of error k
+//! contributes a covariance `F_k` of the same parameters. The sources are independent of each other and of the noise,
+//! so the total covariance is `Σ + Σ_k F_k`, which [`ErrorBars::total`] computes.
 
 use dynident_estimation::Estimate;
 use nalgebra::DMatrix;
@@ -15,13 +15,13 @@ use serde::{Deserialize, Serialize};
 pub enum ErrorSource {
     /// Residuals of the fit: noise, and torque that the model does not explain.
     Noise,
-    /// Remaining uncertainty of the lag between motion and torque.
+    /// Remaining uncertainty of the time lag between motion and torque.
     Lag,
-    /// Variation of the parameters from log to log.
+    /// Variation of the parameters between logs, for example of friction from day to day.
     LogVariation,
-    /// Uncertainty of the selected friction constants.
+    /// Uncertainty of the nonlinear constants of selected friction.
     FrictionConstants,
-    /// Uncertainty of stated drive gains. Payloads only.
+    /// Uncertainty of the drive gains that the study states; only for payloads.
     Gains,
     /// Uncertainty of the parameters that are held at nominal values
     /// ([`ConditionalEstimate`](crate::ConditionalEstimate)).
@@ -31,19 +31,19 @@ pub enum ErrorSource {
 #[derive(Clone, Debug)]
 struct ErrorTerm {
     source: ErrorSource,
-    /// Covariance of the columns of the estimate, or of the first of them.
+    /// Covariance of all parameters of the estimate, or only of the first ones.
     covariance: DMatrix<f64>,
 }
 
-/// The terms of an estimate's covariance beyond the noise, in the order of their sources.
+/// Covariance terms of an estimate for the sources of error other than noise, in the order of the sources.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorBars {
     terms: Vec<ErrorTerm>,
 }
 
 impl ErrorBars {
-    /// Adds a term. `covariance` has the size of the estimate or belongs to its first columns; rows of held columns
-    /// must be zero. `None` adds nothing.
+    /// Adds a source of error. `covariance` has the size of the estimate, or belongs to its first parameters only; rows
+    /// of fixed parameters must be zero. `None` adds nothing.
     #[must_use]
     pub fn with(mut self, source: ErrorSource, covariance: Option<DMatrix<f64>>) -> Self {
         self.terms.extend(covariance.map(|covariance| ErrorTerm { source, covariance }));
@@ -51,12 +51,13 @@ impl ErrorBars {
         self
     }
 
-    /// The estimate with all terms in its covariance, standard deviations and intervals
-    /// ([`Estimate::with_further_error`]). `noise` is the estimate as its estimator returned it.
+    /// The estimate with all terms included in its covariance, standard deviations and intervals
+    /// ([`Estimate::with_further_error`]). `noise` is the estimate as the estimator returned it.
     pub fn total(&self, noise: &Estimate) -> Estimate {
         self.terms.iter().fold(noise.clone(), |sum, term| {
             let mut sum = sum.with_further_error(&term.covariance);
-            // The nearest consistent body of a payload uses both covariances.
+            // The consistent body of a payload is computed from the covariance with and without the uncertainty of
+            // gains.
             if term.source == ErrorSource::Gains {
                 sum.covariance_white += &term.covariance;
             }
@@ -64,8 +65,8 @@ impl ErrorBars {
         })
     }
 
-    /// Standard deviation of a parameter by source, in the parameter's unit: the noise first, then every further term
-    /// that is not zero. Their squares add up to the square of the standard deviation of [`total`](Self::total).
+    /// Standard deviation of a parameter by source, in the parameter's unit: first noise, then every other source that
+    /// is not zero. The sum of the squares is the square of the standard deviation of [`total`](Self::total).
     pub fn std_by_source(&self, noise: &Estimate, column: usize) -> Vec<(ErrorSource, f64)> {
         let of_term = |term: &ErrorTerm| {
             let variance = if column < term.covariance.nrows() { term.covariance[(column, column)] } else { 0.0 };

@@ -1,15 +1,17 @@
-//! Variation of parameters between logs, as a term of the error bars: friction varies from day to day.
+//! Variation of parameters between logs, as a part of the error bars; friction, for example, varies from day to day.
 //!
-//! Each training log is fitted alone. If two logs differ by more than their error bars, the parameters vary from log to
-//! log. With `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` and its mean k² over the pairs of logs and the parameters of one kind
-//! (bodies and drives; friction), their variance between logs is `τ² = (k² − 1) σ̄²`, where σ̄² is the mean variance of
-//! a single log's fit. This is the method of moments of DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177,
-//! with one k for parameters of one kind.
+//! Each training log is also fitted alone. If the estimates of two logs differ by more than their error bars, the
+//! parameters vary between the logs. For logs a and b, `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` is the squared difference of
+//! a parameter in units of its variance. Let k² be the mean of z² over the pairs of logs and over all parameters of one
+//! kind (bodies and drives, or friction). The variance of a parameter between logs is then `τ² = (k² − 1) σ̄²`, where
+//! σ̄² is the mean variance of the parameter in fits to single logs. This is the method of moments of DerSimonian and
+//! Laird, Controlled Clinical Trials 7 (1986) 177, with one k for parameters of one kind.
 //!
-//! The fit to all logs is a weighted mean of the single fits, `θ̂ = Σ_l A_l θ_l` with `A_l = N⁻¹ N_l` and the
-//! information N_l of log l. With T the variation between logs, its error relative to the mean of all days grows by
-//! `Σ_l A_l T A_lᵀ`: varying friction causes errors of bodies and drives if the motion of the logs differs. The error
-//! relative to a new day grows by T more. The error bars are for a new day: `Σ + Σ_l A_l T A_lᵀ + T`.
+//! The fit to all logs is a weighted mean of the fits to single logs, `θ̂ = Σ_l A_l θ_l`, with `A_l = N⁻¹ N_l`, the
+//! information matrix N_l of log l and their sum N. The covariance T of the variation between logs adds
+//! `Σ_l A_l T A_lᵀ` to the covariance of θ̂ as an estimate of the mean over all days. (If the motions of the logs
+//! differ, varying friction also causes errors of bodies and drives.) As a prediction for a new day, θ̂ has an
+//! additional error with covariance T. The error bars are for a new day: `Σ + Σ_l A_l T A_lᵀ + T`.
 
 use crate::estimators::EstimationSettings;
 use crate::friction_by_log::is_friction_column;
@@ -19,18 +21,19 @@ use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSett
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Differences of parameters between logs, in units of the logs' own error bars; 1 without variation.
+/// Differences of parameters between logs, in units of the error bars of fits to single logs (root mean square); 1
+/// without variation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogVariation {
-    /// Bodies and drive inertias; `None` if too few are determined by single logs.
+    /// Ratio for bodies and drive inertias; `None` if single logs determine too few of them.
     pub bodies: Option<f64>,
-    /// Friction, offsets and other torques of the joints; `None` if too few are determined by single logs.
+    /// Ratio for friction, offsets and other joint torques; `None` if single logs determine too few of them.
     pub friction: Option<f64>,
 }
 
-/// Covariance that the variation between training logs adds to an estimate, for the prediction of a new day, and the
-/// size of that variation. `None` for a single log.
+/// Covariance that the variation between training logs adds to an estimate as a prediction for a new day, and the size
+/// of the variation. `None` for a single log.
 pub(crate) fn variation_of_logs(
     training: &Training,
     settings: &EstimationSettings,
@@ -50,7 +53,7 @@ pub(crate) fn variation_of_logs(
         variation(&alone, &columns, &settings.thresholds.log_variation)
     });
 
-    // T with the correlations of the single fits, then its effect on the fit to all logs.
+    // Covariance T, with the correlations of the fits to single logs; then its effect on the fit to all logs.
     let k = |column: usize| if is_friction[column] { friction } else { bodies }.unwrap_or(1.0).max(1.0);
     let apart = |column: usize| (k(column).powi(2) - 1.0).sqrt();
     let of_one: DMatrix<f64> = alone.iter().fold(DMatrix::zeros(count, count), |sum, one| {
@@ -61,8 +64,8 @@ pub(crate) fn variation_of_logs(
     Some((of_mean + between, LogVariation { bodies, friction }))
 }
 
-/// `Σ_l A_l T A_lᵀ` over the columns of T, `between`. `None` if the rows of all logs do not determine the free columns
-/// of the estimate.
+/// Covariance `Σ_l A_l T A_lᵀ` that the variation T (`between`) of parameters between logs causes in the fit to all
+/// logs. `None` if the rows of all logs do not determine the free parameters of the estimate.
 fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let count = between.nrows();
     let is_free = |column: &usize| estimate.rank.fixed.iter().all(|fixed| fixed.column != *column);
@@ -73,7 +76,8 @@ fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<
         let factor = problem.combined(&weights).and_then(|factor| factor.selected(&free)).ok()?;
         Some(factor.regressor_triangle())
     };
-    // R of all rows, scaled to columns of equal length because `N = RᵀR` squares the condition number.
+    // Triangular factor R of all rows. The columns are scaled to equal length, because `N = RᵀR` squares the condition
+    // number.
     let mut all = triangle_of(problem)?;
     let lengths: Vec<f64> = all.column_iter().map(|column| column.norm()).collect();
     let shorten = |triangle: &mut DMatrix<f64>| {
@@ -147,7 +151,8 @@ fn fit_rows(
     weighted_least_squares(&rows, settings)
 }
 
-/// k of some parameters: root mean square of z over pairs of logs, each corrected for Student's distribution.
+/// Root mean square of the parameter differences z over pairs of logs, corrected for Student's distribution: the ratio
+/// k of the parameters in `columns`.
 fn variation(alone: &[Estimate], columns: &[usize], thresholds: &LogVariationThresholds) -> Option<f64> {
     let is_fixed = |one: &Estimate, column: usize| one.rank.fixed.iter().any(|fixed| fixed.column == column);
     let mut squares = Vec::new();

@@ -1,4 +1,4 @@
-//! Consistency of study, robot and recordings, tested before a fit.
+//! Consistency of study, robot and recordings, tested without selecting friction or estimating bodies.
 
 use crate::changes::{LogLoad, log_loads};
 use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
@@ -15,24 +15,27 @@ use dynident_rows::{Execution, Logs, RegressorModel, Role, of_role};
 /// Results of the tests before a fit.
 #[derive(Clone, Debug)]
 pub struct StudyExamination {
-    /// Index and import report of each recording; `None` for prepared motions.
+    /// Index and import report of each recording; the report is `None` for a prepared motion.
     pub imports: Vec<(usize, Option<ImportReport>)>,
-    /// Mistakes, units of torque, payloads; `None` if jumps in a log invalidate the comparison.
+    /// Mistakes in the study, wrong units of torque, undeclared payloads; `None` if jumps in a log invalidate the
+    /// comparison.
     pub diagnosis: Option<Diagnosis>,
-    /// Loads that only one of several training recordings carries; empty if a mistake explains the recordings better.
+    /// Loads that only one of several training recordings carries; empty if a mistake in the study explains the
+    /// recordings better.
     pub loads: Vec<LogLoad>,
-    /// Events in the recordings; the diagnosis does not use intervals that are set aside.
+    /// Events in the recordings; the diagnosis does not use intervals that are excluded from the fit.
     pub events: Vec<RecordingEvents>,
-    /// Joints whose unexplained torque is a function of their position; empty if a mistake explains the recordings.
+    /// Joints whose unexplained torque is a function of their position; empty if a mistake in the study explains the
+    /// recordings.
     pub position_torques: Vec<PositionTorque>,
-    /// Number of rows of all joints for a fit.
+    /// Number of rows of all joints that a fit would use.
     pub rows: usize,
-    /// Number of base parameters for a fit.
+    /// Number of base parameters that a fit would estimate.
     pub parameters: usize,
 }
 
-/// Reads every recording of a task and searches for mistakes in the training recordings and for payloads in the others.
-/// No friction is selected and no bodies are estimated.
+/// Reads every recording of a task. Searches for mistakes of the study in the training recordings, and for payloads and
+/// mistakes in the held-out recordings. No friction is selected and no bodies are estimated.
 ///
 /// # Errors
 /// Recordings cannot be read, or there are too few rows.
@@ -59,7 +62,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let known = training.columns.is_plain().then_some(theta);
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
-    // Before the diagnosis, so that it finds the motions stored.
+    // This is done before the diagnosis, which can then use the motions in memory.
     let model: RegressorModel = robot.clone().into();
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));

@@ -5,37 +5,40 @@ use crate::training::Training;
 use dynident_estimation::{Estimate, HALF_WIDTH_95};
 use serde::{Deserialize, Serialize};
 
-/// Ratio of nominal effect to error bar above which an estimate is conditional.
+/// Minimum ratio of the effect of an uncertain nominal value to the error bar of an estimate, for the estimate to be
+/// reported as conditional.
 const MIN_EFFECT_RATIO: f64 = 0.1;
-/// Minimum ratio to the largest effect for a fixed parameter to be listed.
+/// Minimum effect of a fixed parameter relative to the largest effect, for the parameter to be listed.
 const MIN_LISTED_RATIO: f64 = 0.1;
-/// A parameter fixed at nominal on which an estimate depends.
+/// A parameter that is fixed at its nominal value and influences an estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Condition {
     /// Symbol of the fixed parameter.
     pub on: String,
-    /// Change of the estimate per unit of the fixed parameter; the logs determine `estimate - per_unit * parameter`.
+    /// Change of the estimate per unit of the fixed parameter. The logs determine `estimate - per_unit * parameter`.
     pub per_unit: f64,
 }
 
 /// Dependence of a base parameter on fixed parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConditionalEstimate {
-    /// Fixed parameters with a significant effect, strongest first; empty for an independent estimate.
+    /// Fixed parameters with a significant effect, the strongest first; empty for an estimate without such a
+    /// dependence.
     pub on: Vec<Condition>,
-    /// Standard deviation from the error of the nominal values, in the parameter's unit; `None` if nominal values are
-    /// unknown or have no significant effect.
+    /// Standard deviation of the estimate that the uncertainty of the nominal values causes, in the parameter's unit;
+    /// `None` if nominal values are unknown or have no significant effect.
     pub nominal_std: Option<f64>,
-    /// Half width of the 95 % interval including the error of the nominal values; for a fixed parameter only that
-    /// error. `None` if nominal values are unknown.
+    /// Half-width of the 95 % interval, including the uncertainty of the nominal values; for a fixed parameter, only
+    /// the latter. `None` if nominal values are unknown.
     pub half_width_95: Option<f64>,
 }
 
-/// Dependence of every base parameter on fixed ones. `θ_F` is estimated with `θ_H = nominal`, with the sensitivity
-/// `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹W_FᵀW_H` and the variance `σ² + ∂ C_H ∂ᵀ`. C_H is the uncertainty of the robot description
-/// ([`nominal_covariance`]). Significance is judged by the intervals of the noise alone, `noise_half_width_95`, so that
-/// an uncertain lag does not hide the dependence. Empty if all parameters are excited.
+/// Dependence of every base parameter on the parameters that are fixed at nominal values. The parameters θ_F are
+/// estimated while θ_H are fixed; W_F and W_H are their regressor columns. The sensitivity is
+/// `S = ∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹W_FᵀW_H`, and the variance is `σ² + S C_H Sᵀ`, where C_H is the covariance of the
+/// nominal values ([`nominal_covariance`]). An effect is significant compared with the intervals from noise alone,
+/// `noise_half_width_95`, so that an uncertain lag does not hide the dependence. Empty if all parameters are excited.
 pub fn conditionals(
     training: &Training,
     estimate: &Estimate,
@@ -91,12 +94,12 @@ pub fn conditionals(
     (0..count).map(|column| if is_fixed(column) { of_fixed(column) } else { of_free(column) }).collect()
 }
 
-/// Joints whose motion stays below the position noise in all training logs.
+/// Joints whose motion is not above the position noise in any training log.
 pub fn resting_joints(training: &Training) -> Vec<usize> {
     let rests = |joint: &usize| {
         let mut reports = training.logs.iter().map(|log| log.statistics.report.as_ref());
         reports.all(|report| {
-            // The importer uses the joint order of the model.
+            // The import report has the joints in the order of the model.
             report.is_some_and(|report| report.cutoff.joints_hz.get(*joint).is_some_and(Option::is_none))
         })
     };

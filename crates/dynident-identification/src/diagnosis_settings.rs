@@ -1,18 +1,18 @@
-//! Limits behind the verdicts of the diagnosis.
+//! Limits of the diagnosis, which searches for mistakes in study, robot description and logs.
 //!
-//! "Unexplained share" is the residual of a joint's torque over this torque (root mean squares), 0 to 1. Scores are
-//! sums of its logarithm over all joints.
+//! The "unexplained share" of a joint is the residual of its torque divided by its torque (root mean squares), 0 to 1.
+//! The score of a hypothesis is the sum of the logarithms of this share over all joints, plus costs.
 
 use crate::limits::{InvalidLimit, check_limits};
 
-/// Limits of the diagnosis by topic.
+/// Limits of the diagnosis, grouped by topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DiagnosisSettings {
     /// Comparison of hypotheses.
     pub score: ScoreSettings,
     /// Acceptance of one hypothesis.
     pub acceptance: AcceptanceSettings,
-    /// Plausible motion.
+    /// Plausibility of the motion.
     pub motion: MotionLimits,
     /// Channels that were logged too late or too early.
     pub late_channel: LateChannelSettings,
@@ -27,42 +27,44 @@ pub struct DiagnosisSettings {
 /// Limits for the comparison of hypotheses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScoreSettings {
-    /// Smallest improvement of the score for which another hypothesis replaces the study as written; 0.6, as if the
-    /// unexplained share of one joint fell to 0.55 of its value. On seven sets of real logs the best wrong hypothesis
-    /// gains 0.41.
+    /// Smallest improvement of the score with which another hypothesis replaces the study as written. Default 0.6, as
+    /// if the unexplained share of one joint fell to 0.55 of its value. On seven sets of real logs, the best wrong
+    /// hypothesis gains 0.41.
     pub min_gain: f64,
-    /// Smallest improvement of the score for another sample rate; 1.2. Wrong hypotheses about correct rates gain up to
-    /// 1.1, corrections of wrong rates 2.0 and more.
+    /// Smallest improvement of the score with which another sample rate is accepted. Default 1.2. Wrong hypotheses for
+    /// correct rates gain up to 1.1, corrections of wrong rates 2.0 and more.
     pub min_gain_of_rate: f64,
-    /// Smallest improvement of the score from which another gain of one torque needs no further evidence; 1.2. On real
-    /// logs a wrong gain reaches 0.83.
+    /// Improvement of the score above which another gain of one torque needs no further evidence. Default 1.2. On real
+    /// logs, a wrong gain reaches 0.83.
     pub min_gain_of_torque_gain: f64,
-    /// Largest difference between the scores of two hypotheses that are reported as indistinguishable; 0.2.
+    /// Largest score difference between two hypotheses that are reported as indistinguishable. Default 0.2.
     pub max_indistinguishable: f64,
-    /// Weight in the score of the residual of the bodies of the robot description, relative to that of the best
-    /// consistent bodies; 0.5, since descriptions have errors.
+    /// Weight of the residual with the bodies of the robot description in the score, relative to the residual with the
+    /// best physically consistent bodies. Default 0.5, because descriptions have errors.
     pub nominal_weight: f64,
-    /// Added to the score for each joint whose positions are beyond its limits; 1, in units of the score.
+    /// Cost that is added to the score for each joint whose positions exceed its limits. Default 1.
     pub limit_cost: f64,
     /// Largest mean over joints of `ln(residual of a consistent robot / residual of separate parameters of each joint)`
-    /// for a hypothesis that is accepted; 0.9. Real logs of arms with unusual friction reach 0.55.
+    /// with which a hypothesis is accepted. Default 0.9. Real logs of arms with unusual friction reach 0.55.
     pub max_log_ratio: f64,
-    /// Smallest number of independent instants per parameter of a joint; 2. With fewer, separate parameters of a joint
-    /// fit the noise, and friction and elasticity without a term in the model.
+    /// Smallest number of independent instants per parameter of a joint. Default 2. With fewer instants, separate
+    /// parameters of a joint fit noise, friction and elasticity that the model does not contain.
     pub min_instants_per_parameter: f64,
-    /// Largest factor on `min_gain` for short logs; 1.5, so that 0.9 is required. In parts of correct logs the best
-    /// wrong hypothesis improves the score by up to 0.83; the correction of a reversed joint in a short log improves it
-    /// by 1.3.
+    /// Largest factor on `min_gain` for short logs. Default 1.5, so that at most 0.9 is required. In parts of correct
+    /// logs, the best wrong hypothesis improves the score by up to 0.83; the correction of a reversed joint in a short
+    /// log improves it by 1.3.
     pub max_margin: f64,
-    /// Factor on `min_gain` (because the log is short) from which `max_log_ratio` is not tested; 1.5.
+    /// Factor on `min_gain`, which grows for short logs, from which `max_log_ratio` is not tested. Default 1.5.
     pub few_instants_margin: f64,
-    /// Unexplained share of all torque above which lower cut-offs are tried and held-out logs are not examined; 0.5.
+    /// Unexplained share of the torque of all joints above which lower cut-offs are tried and held-out logs are not
+    /// examined. Default 0.5.
     pub max_unexplained: f64,
-    /// Cut-offs that are then tried, relative to a cut-off that was chosen from the data; 0.5 and 0.25.
+    /// Lower cut-offs to try in this case, relative to the cut-off that was selected from the data. Default 0.5 and
+    /// 0.25.
     pub lower_cutoffs: [f64; 2],
-    /// Largest number of mistakes in one study; 3.
+    /// Largest number of mistakes in one study. Default 3.
     pub max_mistakes: usize,
-    /// Largest number of other hypotheses that are reported; 4.
+    /// Largest number of other hypotheses that are reported. Default 4.
     pub max_reported: usize,
 }
 
@@ -87,29 +89,29 @@ impl Default for ScoreSettings {
     }
 }
 
-/// Limits that a hypothesis has to keep relative to the hypothesis that it corrects.
+/// Limits that a correction must keep relative to the hypothesis without it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AcceptanceSettings {
-    /// Largest ratio of the unexplained share of all torque with the correction to that without; 1.05.
+    /// Largest ratio of the unexplained share of all joints with the correction to the share without it. Default 1.05.
     pub max_ratio_of_all: f64,
-    /// Largest ratio of the unexplained share of any joint with the correction to that without; 1.25. A joint is
-    /// rejected only if it exceeds `max_increase_of_joint` as well.
+    /// Largest ratio of the unexplained share of any joint with the correction to the share without it. Default 1.25. A
+    /// correction is rejected only if a joint also exceeds `max_increase_of_joint`.
     pub max_ratio_of_joint: f64,
-    /// Largest increase of the unexplained share of any joint by the correction; 0.02.
+    /// Largest increase of the unexplained share of any joint by the correction. Default 0.02.
     pub max_increase_of_joint: f64,
-    /// Largest logarithm of the ratio of one joint over the improvement of all joints; 0.1. It replaces
-    /// `max_ratio_of_joint` where it allows more.
+    /// Largest increase of the logarithm of one joint's unexplained share, divided by the improvement of the score of
+    /// all joints. Default 0.1. This limit replaces `max_ratio_of_joint` if it permits more.
     pub max_share_of_gain: f64,
-    /// Unexplained share above which the channels of a joint are mostly noise and prove nothing; 0.5.
+    /// Unexplained share above which the channels of a joint are mostly noise and prove nothing. Default 0.5.
     pub max_unexplained_of_joint: f64,
-    /// Largest ratio of the unexplained share of a joint with another unit to that without, for the other unit to be
-    /// proven; 0.8.
+    /// Largest ratio of a joint's unexplained share with another unit to the share without it, for the other unit to be
+    /// accepted. Default 0.8.
     pub max_ratio_of_unit: f64,
-    /// Ratio of a joint's unexplained share by one robot to that by the joint's own parameters from which its torque is
-    /// inconsistent with the other joints; 1.8.
+    /// Ratio of two unexplained shares of a joint above which its torque is inconsistent with the other joints: one
+    /// robot for all joints, divided by separate parameters of the joint. Default 1.8.
     pub min_inconsistent_ratio: f64,
-    /// Largest ratio of the residual of a joint with another width of the friction step to that without, for the other
-    /// width to be proven; 0.9.
+    /// Largest ratio of a joint's residual with another width of the smoothed friction sign to the residual without it,
+    /// for the other width to be accepted. Default 0.9.
     pub max_ratio_of_step: f64,
 }
 
@@ -128,19 +130,20 @@ impl Default for AcceptanceSettings {
     }
 }
 
-/// Limits of plausible motion.
+/// Limits of a plausible motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
-    /// Largest distance beyond a position limit, as a share of the joint's range; 0.02, since zeros are calibrated to
-    /// about a degree. Beyond it the position is treated as impossible.
+    /// Largest distance beyond a position limit, as a share of the joint's range. Default 0.02, because zeros are
+    /// calibrated to about a degree. Positions further beyond are treated as impossible.
     pub max_overtravel: f64,
-    /// Largest ratio of a velocity to the velocity limit of the description; 1.5, since descriptions state rated
-    /// velocities.
+    /// Largest ratio of a velocity to the velocity limit in the robot description. Default 1.5, because descriptions
+    /// state rated velocities.
     pub max_velocity_ratio: f64,
     /// Lowest and highest rate of a recorder, Hz, for an arm of usual size
-    /// ([`CharacteristicScale::hertz`](dynident_model::CharacteristicScale::hertz)); 4 to 50,000.
+    /// ([`CharacteristicScale::hertz`](dynident_model::CharacteristicScale::hertz)). Default 4 to 50,000.
     pub recorder_rates_hz: [f64; 2],
-    /// Largest share of interpolated samples in the filtered torque of a row, 0 to 1; 0.3. Rows with more are left out.
+    /// Largest share of interpolated samples in the filtered torque of a row, 0 to 1. Default 0.3. Rows with a larger
+    /// share are excluded.
     pub max_interpolated: f64,
 }
 
@@ -159,25 +162,26 @@ impl Default for MotionLimits {
 /// ([`CharacteristicScale::seconds`](dynident_model::CharacteristicScale::seconds)), which moves at about 1 Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateChannelSettings {
-    /// Largest tried shift of all torques relative to the positions, in both directions, s; 2.
+    /// Largest shift of all torques relative to the positions that is tried, in both directions, s. Default 2.
     pub max_lag_s: f64,
-    /// Step of the tried shifts, s; 0.1.
+    /// Step between the shifts that are tried, s. Default 0.1.
     pub lag_step_s: f64,
-    /// Largest tried shift of one joint's channel, s; 0.5. A longer shift is half a period of its motion, which looks
-    /// like another sign.
+    /// Largest shift of one joint's channel that is tried, s. Default 0.5. A longer shift is half a period of the
+    /// motion, which looks like a reversed sign.
     pub max_lag_of_joint_s: f64,
-    /// Largest tried shift as a share of the longest uninterrupted motion; 1/6, since instants need torque on both
-    /// sides.
+    /// Largest shift that is tried, as a share of the longest uninterrupted motion. Default 1/6, because the torque
+    /// must be known before and after each instant.
     pub max_share_of_motion: f64,
-    /// Smallest number of instants per column of a joint; 2. With fewer, parameters fit the shifts.
+    /// Smallest number of instants per regressor column of a joint. Default 2. With fewer instants, parameters can fit
+    /// wrong shifts.
     pub min_instants_per_column: usize,
-    /// Unexplained share of all torque below which shifts are not tried; 0.02.
+    /// Unexplained share of the torque of all joints below which shifts are not tried. Default 0.02.
     pub min_unexplained: f64,
-    /// Ratio of a joint's residual by one robot to that by its own parameters from which its channels are shifted
-    /// alone; 1.5.
+    /// Ratio of two residuals of a joint above which shifts of its channels alone are tried: one robot for all joints,
+    /// divided by separate parameters of the joint. Default 1.5.
     pub min_ratio_of_joint: f64,
-    /// Largest ratio of the unexplained share of all torque with a shift to that of the best hypothesis without, for
-    /// the shift to be accepted; 0.8.
+    /// Largest ratio of the unexplained share of all joints with a shift to that of the best hypothesis without it, for
+    /// the shift to be accepted. Default 0.8.
     pub max_ratio_of_all: f64,
 }
 
@@ -199,26 +203,27 @@ impl Default for LateChannelSettings {
 /// Limits for the comparison with the robot description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescriptionSettings {
-    /// Smallest share of a joint's torque, without friction, that the scaled nominal bodies explain; 0.5. With less,
-    /// their scale is ignored.
+    /// Smallest share of a joint's torque, with friction removed, that the nominal bodies times a factor must explain.
+    /// Default 0.5. If they explain less, the factor is ignored.
     pub min_explained: f64,
-    /// Largest usual factor between torque and description; 3. A factor above it, or below 1/3, shows another unit or a
-    /// motor constant.
+    /// Largest usual factor between the torque and the torque of the described bodies. Default 3. A factor above it, or
+    /// below 1/3, indicates another unit or a motor constant.
     pub max_scale: f64,
-    /// Largest share of a joint's torque, without friction, that the best consistent robot leaves unexplained; 0.4.
-    /// Joints with more are not compared with the description.
+    /// Largest unexplained share of a joint's torque, with friction removed, for the best physically consistent robot.
+    /// Default 0.4. Joints with a larger share are not compared with the description.
     pub max_unexplained: f64,
-    /// Explained share of the best joint below which the description is of another robot; 0.65. On six sets of real
-    /// logs the least share is 0.90; descriptions of other arms with as many joints reach 0.45. In slow or small motion
-    /// correct descriptions explain less, so robots with usual errors are compared as well.
+    /// Explained share of the best joint below which the description is treated as that of another robot. Default 0.65.
+    /// On six sets of real logs the smallest share is 0.90; descriptions of other arms with as many joints reach 0.45.
+    /// In slow or small motion, correct descriptions explain less, so the share is also compared with that of random
+    /// robots with usual errors.
     pub min_explained_of_best: f64,
     /// Largest relative difference between the median factor over the joints and the factor of a unit, for this unit to
-    /// be named; 0.15.
+    /// be reported. Default 0.15.
     pub max_unit_error: f64,
     /// Largest relative difference between the factor of a joint and the factor of a unit, for the joint to support
-    /// this unit; 0.8.
+    /// this unit. Default 0.8.
     pub max_unit_spread: f64,
-    /// Usual range of the ratio of a body's mass to the described mass; 0.5 to 2.
+    /// Usual range of the ratio of a body's mass to its mass in the description. Default 0.5 to 2.
     pub usual_mass_ratios: [f64; 2],
 }
 
@@ -236,26 +241,29 @@ impl Default for DescriptionSettings {
     }
 }
 
-/// Limits for channels that no correction repairs.
+/// Limits for channels that no correction can repair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelSettings {
-    /// Unexplained share of a joint from which its channels are compared with those of other joints, and from which
-    /// torques without negative values are magnitudes; 0.1. Two joints may move in the same way.
+    /// Unexplained share of a joint above which its channels are compared with those of other joints, and above which
+    /// torques without negative values are treated as magnitudes. Default 0.1. (Below it, equal channels may be two
+    /// joints that move in the same way.)
     pub min_unexplained_of_duplicate: f64,
-    /// Largest torque of the wrong sign that a filter may add to magnitudes, relative to the largest torque of the
-    /// joint; 0.05.
+    /// Largest torque of the wrong sign that a filter may cause in magnitudes, relative to the largest torque of the
+    /// joint. Default 0.05.
     pub max_undershoot: f64,
-    /// Ratio of a joint's unexplained share by one robot to that by its own parameters from which its torque is
-    /// doubted; 2.4. Seven sets of real logs reach 1.8, single logs of these 2.3.
+    /// Ratio of two unexplained shares of a joint above which its torque is reported as doubtful: one robot for all
+    /// joints, divided by separate parameters of the joint. Default 2.4. Seven sets of real logs reach 1.8, single logs
+    /// of these sets 2.3.
     pub min_doubted_ratio: f64,
-    /// The same ratio from which the torque is not of this robot; 2.6.
+    /// The same ratio above which the torque does not belong to this robot. Default 2.6.
     pub min_foreign_ratio: f64,
-    /// Smallest unexplained share of a joint that is doubted; 0.03.
+    /// Smallest unexplained share of a joint that is reported as doubtful. Default 0.03.
     pub min_doubted_unexplained: f64,
-    /// Unexplained share by the joint's own parameters above which a torque is independent of the motion; 0.75.
+    /// Unexplained share with separate parameters of the joint above which a torque is independent of the motion.
+    /// Default 0.75.
     pub min_independent_alone: f64,
-    /// Unexplained share by one robot, which predicts a torque from the other joints, above which a torque is
-    /// independent of the motion; 1.
+    /// Unexplained share with one robot for all joints above which a torque is independent of the motion. Default 1:
+    /// the prediction from the other joints is then no better than zero torque.
     pub min_independent: f64,
 }
 
@@ -276,19 +284,22 @@ impl Default for ChannelSettings {
 /// Limits for held-out logs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOutSettings {
-    /// Unexplained share of a joint in a held-out log, relative to that in the training logs, from which the log is
-    /// reported as not explained; 3. Real sets reach 2.4 for all joints together.
+    /// Unexplained share of a joint in a held-out log, divided by that in the training logs, above which the log is
+    /// reported as not explained. Default 3. Real data sets reach 2.4 for all joints together.
     pub min_unexplained_ratio: f64,
-    /// Improvement of the score from which a fitted number (such as a scale) replaces the nearest candidate; 0.05.
+    /// Improvement of the score with which a fitted number (such as a scale) replaces the nearest standard candidate.
+    /// Default 0.05.
     pub min_gain_of_number: f64,
-    /// Ratio of a torque to its measurement, or the inverse, from which another gain is tried; 1.15.
+    /// Ratio of the predicted to the measured torque, or its inverse, above which another gain is tried. Default 1.15.
     pub min_torque_gain: f64,
-    /// Residual of one robot for all logs, relative to that with a payload or a mistake, up to which neither is
-    /// reported; 1.3.
+    /// Residual with one robot for all logs, divided by that with a payload or a mistake. Below this ratio neither is
+    /// reported. Default 1.3.
     pub max_ratio_of_one_robot: f64,
-    /// Largest ratio of the residual with a payload to that without, for the payload to be reported; 0.6.
+    /// Largest ratio of the residual with a payload to the residual without it, for the payload to be reported. Default
+    /// 0.6.
     pub max_ratio_with_payload: f64,
-    /// Smallest estimated mass of a payload, in its standard deviations, for the payload to be reported; 5.
+    /// Smallest estimated mass of a payload, divided by its standard deviation, for the payload to be reported. Default
+    /// 5.
     pub min_payload_deviations: f64,
 }
 
@@ -306,7 +317,7 @@ impl Default for HeldOutSettings {
 }
 
 impl DiagnosisSettings {
-    /// Checks that all limits are finite and positive, and that ranges are ascending.
+    /// Checks that all limits are finite and positive, and that the ends of ranges are in ascending order.
     ///
     /// # Errors
     /// The first invalid limit.

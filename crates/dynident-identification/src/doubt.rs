@@ -1,4 +1,4 @@
-//! Signs in a fit that the study may contain a mistake.
+//! Tests on a fit that indicate a mistake in the study.
 
 use crate::diagnosis::{MotionLimits, has_jumps, is_beyond_limits};
 use crate::thresholds::DoubtThresholds;
@@ -10,14 +10,15 @@ pub(crate) fn have_jumps(training: &Training) -> bool {
     training.logs.iter().filter_map(|log| log.statistics.report.as_ref()).any(has_jumps)
 }
 
-/// Whether a training recording has a joint beyond its limits or an impossible rate.
+/// Whether a joint exceeds its limits in a training recording, or a training recording has an implausible rate.
 pub(crate) fn break_limits(training: &Training, model: &Model, limits: &MotionLimits) -> bool {
     let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
     reports.into_iter().any(|report| is_beyond_limits(model, report, limits))
 }
 
-/// Whether the residual of a consistent robot with base parameters `consistent` is clearly larger than that of separate
-/// parameters for each joint, or there is no such robot, or there are too few rows.
+/// Whether a fit is doubtful. This is the case if the residual of the physically consistent robot (base parameters
+/// `consistent`) is clearly larger than that of separate parameters for each joint, if there is no such robot, or if
+/// there are too few rows.
 pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>, thresholds: &DoubtThresholds) -> bool {
     let Some(theta) = consistent else { return true };
     let mut sums = vec![JointSums::default(); training.problem.joints().len()];
@@ -40,7 +41,7 @@ pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>, thres
 
 #[derive(Clone, Copy, Default)]
 struct JointSums {
-    /// Residual of the consistent robot, N² m².
+    /// Sum of squared residuals of the physically consistent robot, N² m².
     of_robot: f64,
     of_joint: f64,
     torque: f64,
@@ -49,10 +50,10 @@ struct JointSums {
 }
 
 impl JointSums {
-    /// Logarithm of the ratio of both residuals. The joint's own residual is corrected for overfitting by `n / (n - p)`
-    /// in the squares.
+    /// Logarithm of the ratio of the residual with the physically consistent robot to that with separate parameters of
+    /// the joint. The square of the latter is corrected for overfitting by `n / (n - p)`, with n rows and p parameters.
     fn log_residual_ratio(&self) -> f64 {
-        // Residuals below a hundredth of the torque are ignored.
+        // Residuals below a hundredth of the torque are treated as equal to it.
         let floor = 1e-4 * self.torque;
         let noise = self.of_joint * self.rows / (self.rows - self.columns);
         (0.5 * (self.of_robot.max(floor) / noise.max(floor)).ln()).max(0.0)

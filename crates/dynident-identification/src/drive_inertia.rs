@@ -1,21 +1,20 @@
-//! Test for drive inertia: does the torque come from the motors, which turn with their rotors, or from sensors after
-//! the gear?
+//! Test whether the torque contains the inertia of the drives.
 //!
 //! Rotor and gear add `I_a q̈` to the torque of their own joint only. Torque measured after the gear does not contain
-//! it. This is a property of the robot and not of a joint, so one test covers all drives: each joint's drive inertia in
-//! units of its standard deviation, summed and divided by the deviation of the sum (Stouffer's method, *The American
-//! Soldier* 1, 1949, 45),
-//! divided by the deviation of the sum (Stouffer's method, *The American Soldier* 1, 1949, 45),
+//! it. Whether the torque is measured at the motors (which turn with their rotors) or after the gears is a property of
+//! the robot, not of a joint. Therefore one test covers all drives: the estimated drive inertias I_i are divided by
+//! their standard deviations s_i, summed, and divided by the standard deviation of the sum (Stouffer's method, *The
+//! American Soldier* 1, 1949, 45):
 //!
 //! ```text
 //! Z = Σ_i z_i / √max(n, Σ_ij R_ij),    z_i = Φ⁻¹(F_ν(I_i / s_i))
 //! ```
 //!
-//! with R the correlations of the n estimates. Z is standard normal if no drive has inertia, for any number of drives.
-//! Friction and offsets are free in every log (`friction_by_log.rs`), because otherwise their variation from day to day
-//! would appear as drive inertia. Rotors can only add inertia, so a negative estimate is evidence against it. F is
-//! Student's distribution with the ν degrees of freedom of s_i; Φ⁻¹ F has Wallace's form (Ann. Math. Statist. 30 (1959)
-//! 1121).
+//! R is the correlation matrix of the n estimates. F_ν is Student's distribution with the ν degrees of freedom of s_i;
+//! Φ⁻¹(F_ν) is computed with Wallace's approximation (Ann. Math. Statist. 30 (1959) 1121). If no drive has inertia, Z
+//! is standard normal for any number of drives. Rotors can only add inertia, so a negative estimate is evidence against
+//! drive inertia. Friction and offsets are separate parameters in every log (`friction_by_log.rs`), because otherwise
+//! their variation from day to day would appear as drive inertia.
 
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
@@ -35,42 +34,42 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveInertiaChoice {
-    /// Tested joints, whose drive inertia was left open.
+    /// Names of the tested joints: those whose drive inertia the study does not state.
     pub joints: Vec<String>,
-    /// Whether the model has the drive inertia of these joints.
+    /// Whether the test is positive, so that the model contains the drive inertia of these joints.
     pub seen: bool,
-    /// All drives together, in standard deviations; `None` without a test.
+    /// Test statistic for all drives together, in standard deviations; `None` without a test.
     pub standard_deviations: Option<f64>,
-    /// Required standard deviations.
+    /// Threshold of the test statistic, in standard deviations.
     pub needed: f64,
-    /// Reason for a missing test.
+    /// Reason why the test was not made; `None` if it was made.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untested: Option<String>,
-    /// Estimate of every drive's inertia, except those that are not distinguishable from the inertia of the links.
+    /// Estimated drive inertia of each joint, except those that cannot be distinguished from the inertia of the links.
     pub drives: Vec<DriveInertiaEstimate>,
 }
 
-/// The inertia of one joint's drive in the test.
+/// Estimated drive inertia of one joint, from the rows of the test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveInertiaEstimate {
     /// Name of the joint.
     pub joint: String,
-    /// Reflected inertia, kg m² (kg).
+    /// Inertia of rotor and gear at the joint, kg m² (kg).
     pub inertia: f64,
-    /// Half width of its 95 % interval.
+    /// Half-width of the 95 % interval of the inertia.
     pub half_width_95: f64,
 }
 
 impl DriveInertiaChoice {
-    /// No drive inertia for these joints, without a test, for this reason.
+    /// Result for joints that were not tested and get no drive inertia, with the reason.
     pub fn untested(joints: Vec<String>, reason: &str) -> Self {
         let untested = Some(reason.to_owned());
         let needed = DriveInertiaThresholds::default().min_std;
         Self { joints, seen: false, standard_deviations: None, needed, untested, drives: Vec::new() }
     }
 
-    /// The result as a sentence.
+    /// Result of the test in a sentence.
     pub fn sentence(&self) -> String {
         match (self.standard_deviations, &self.untested) {
             (Some(found), _) if self.seen => {
@@ -92,10 +91,10 @@ impl DriveInertiaChoice {
 }
 
 /// Tests the drive inertia of the joints in `settings.drive_inertia` by least squares on the recordings `training`,
-/// with the other terms as stated. Returns the robot with drive inertia if the test is positive. Filters are those of
-/// `logs`.
+/// with all other terms as the study states them. Returns the robot, with drive inertia if the test is positive. The
+/// filters of `logs` are used.
 ///
-/// The choice is `None` if all named joints have a stated drive inertia.
+/// The choice is `None` if the drive inertia of all named joints is stated.
 ///
 /// # Errors
 /// Recordings cannot be read, or payloads and gains contradict each other. If rows do not determine an estimate, the
@@ -123,7 +122,8 @@ pub fn choose_drive_inertia(
         return untested("base parameters are held, and additional terms would change their columns");
     }
 
-    // Error bars must include the correlation of residuals within a segment, for any setting of the estimate.
+    // For any setting of the estimate, the error bars of this test must include the correlation of residuals within a
+    // time segment.
     let estimation = EstimationSettings { covariance: CovarianceMethod::Jackknife, ..settings.estimation.clone() };
     let settings = IdentificationSettings { estimation, ..settings.clone() };
     let passes = TrainingPasses { logs, settings: &settings, training, payloads, known_arm: None };
@@ -132,7 +132,7 @@ pub fn choose_drive_inertia(
         if let Some((estimate, _)) = rows.gains {
             return Ok(estimate);
         }
-        // Friction that varies between logs looks like drive inertia if it is shared.
+        // Friction that varies between logs would appear as drive inertia if all logs shared its parameters.
         let is_friction: Vec<bool> = rows.model.layout().columns().iter().map(is_friction_column).collect();
         let apart = with_friction_by_log(&rows.problem, &is_friction)?;
         Ok(plain_estimate(&settings.estimation, apart.as_ref().unwrap_or(&rows.problem))?)
@@ -168,8 +168,8 @@ pub fn choose_drive_inertia(
     Ok((if seen { with_drives } else { robot.clone() }, Some(choice)))
 }
 
-/// The joints whose drive inertia is a separate base parameter, with its column. About the first axes it is combined
-/// with the inertia of the links.
+/// Joints whose drive inertia is a separate base parameter, with its column. At the first axes, drive inertia is only
+/// identifiable in a sum with the inertia of the links.
 fn separate_columns(robot: &ParametricModel, joints: &[usize]) -> Vec<(usize, usize)> {
     let expressions = robot.base().expressions();
     let own = |joint: usize| {
@@ -181,7 +181,7 @@ fn separate_columns(robot: &ParametricModel, joints: &[usize]) -> Vec<(usize, us
     joints.iter().filter_map(|&joint| own(joint)).collect()
 }
 
-/// Combined statistic of these columns, standard normal if all are zero.
+/// Test statistic for all of these columns together. It is standard normal if all true values are zero.
 fn combined_statistic(fit: &Estimate, columns: &[usize]) -> f64 {
     let sum: f64 = columns.iter().map(|&column| normal_deviate(fit, column)).sum();
     let correlation = |a: usize, b: usize| fit.covariance[(a, b)] / (fit.std[a] * fit.std[b]);
@@ -189,7 +189,8 @@ fn combined_statistic(fit: &Estimate, columns: &[usize]) -> f64 {
     sum / variance.max(columns.len() as f64).sqrt()
 }
 
-/// Normal deviate with the same probability as the estimate over its standard deviation under Student's distribution.
+/// Standard normal value with the same probability as the ratio of the estimate to its standard deviation in Student's
+/// distribution.
 fn normal_deviate(fit: &Estimate, column: usize) -> f64 {
     let t = fit.values[column] / fit.std[column];
     let nu = fit.std_degrees_of_freedom[column].clamp(1.0, 1.0e6);

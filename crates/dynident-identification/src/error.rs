@@ -1,4 +1,4 @@
-//! Errors of an identification; each message names the log or the place, and the fix.
+//! Errors of an identification; each message contains the log or the place, and the fix.
 
 use crate::consistent::ConsistencyError;
 use crate::diagnosis::DiagnosisError;
@@ -21,7 +21,7 @@ pub enum IdentificationError {
         "no log has the role \"identify\", so there are no data for the fit: remove role = \"validate\" from one [[log]]"
     )]
     NoTrainingLog,
-    /// A recording gives no rows.
+    /// A recording cannot be read or gives no rows.
     #[error("{0}")]
     Log(#[from] LogError),
     /// The estimation fails.
@@ -30,7 +30,7 @@ pub enum IdentificationError {
     /// The estimator fails.
     #[error("{0}")]
     Estimator(#[source] EstimatorError),
-    /// Terms do not match the robot.
+    /// Friction or drive terms do not match the robot.
     #[error("{0}")]
     Model(#[from] ParametricModelError),
     /// Payloads, offsets per log or gains contradict each other.
@@ -70,7 +70,7 @@ impl From<DiagnosisError> for IdentificationError {
 }
 
 impl From<EstimatorError> for IdentificationError {
-    /// Keeps errors of logs and rows as they are.
+    /// Keeps errors of logs and of rows as separate kinds of errors.
     fn from(error: EstimatorError) -> Self {
         match error {
             EstimatorError::Log(error) => Self::Log(error),
@@ -80,7 +80,7 @@ impl From<EstimatorError> for IdentificationError {
     }
 }
 
-/// Reason why logs cannot be reduced to factors: a choice needs the samples of all logs.
+/// Reason why logs cannot be reduced to triangular factors: a choice needs the samples of all logs.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ReduceError {
     /// `reduce` reads each log alone, so all logs need the same cut-off. Write `cutoff_hz` under

@@ -3,7 +3,7 @@
 use dynident_events::{EventKind, EventSearch, LogEvent};
 use dynident_recording::{Finding, Level};
 
-/// One finding for each kind of event of the log `log`, with all of its intervals.
+/// One finding for each kind of event in the log `log`, with all of its time intervals.
 pub fn event_findings(search: &EventSearch, log: &str) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
     let mut done: Vec<(EventKind, bool)> = Vec::new();
@@ -26,7 +26,7 @@ pub fn event_findings(search: &EventSearch, log: &str) -> Vec<Finding> {
     findings
 }
 
-/// Code of a kind of event, which `dynident docs` explains.
+/// Code of a kind of event; `dynident docs CODE` explains it.
 fn code(kind: EventKind) -> &'static str {
     match kind {
         EventKind::DrivesOff => "event-drives-off",

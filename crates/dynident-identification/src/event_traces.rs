@@ -1,15 +1,16 @@
-//! Torque around the events of a log, for the report.
+//! Torque around the events of a log, for plots in the report.
 
 use crate::examination::EventTrace;
 use dynident_events::{EventSearch, LogEvent};
 
-/// Largest number of events of one log with a trace; a log with more has the same event many times.
+/// Maximum number of events of one log with a plot. A log with more events has the same event many times.
 const MAX_TRACES: usize = 12;
-/// Time before and after an event, at least, s, and relative to its duration.
+/// Minimum time that is shown before and after an event, s.
 const MIN_MARGIN_S: f64 = 1.0;
+/// Time that is shown before and after a long event, relative to its duration.
 const MARGIN_SHARE: f64 = 0.5;
 
-/// Measured and predicted torque around each event, of one joint each. `joints` are the names of the model's joints.
+/// Measured and predicted torque around each event, for one joint each. `joints` are the names of the model's joints.
 pub fn event_traces(search: &EventSearch, joints: &[String]) -> Vec<EventTrace> {
     search.events.iter().take(MAX_TRACES).filter_map(|event| trace(search, joints, event)).collect()
 }

@@ -6,15 +6,15 @@ use dynident_events::{EventChoice, EventKind, EventSearch, LogEvent, find_events
 use dynident_recording::IgnoredTorque;
 use dynident_rows::{Execution, Logs, Recording, RegressorModel, Role, Samples, Silent};
 
-/// Maximum number of rows of a log that is searched; a longer log is read only as often as the fit requires.
+/// Maximum number of rows of a log that is searched for events. A longer log is read only as often as the fit requires.
 const MAX_ROWS: u64 = 1_000_000;
 
 /// Events of one recording.
 #[derive(Clone, Debug)]
 pub struct RecordingEvents {
-    /// Number of the recording.
+    /// Index of the recording.
     pub index: usize,
-    /// Its events and the residuals in which they were found.
+    /// The events of the recording, and the residuals in which they were found.
     pub search: EventSearch,
 }
 
@@ -48,8 +48,8 @@ pub fn recording_events(task: &IdentificationTask, execution: Execution<'_>) -> 
     found
 }
 
-/// The events of the task's logs, and the task without the intervals that are set aside in its training logs; `None` if
-/// there are none.
+/// The events in the logs of a task, and the task without the intervals of its training logs that are excluded from the
+/// fit; `None` if no interval is excluded.
 ///
 /// # Errors
 /// Invalid settings of the search.
@@ -63,8 +63,9 @@ pub(crate) fn task_without_events(
     Ok((events, changed.map(|recordings| IdentificationTask { recordings, ..task.clone() })))
 }
 
-/// Marks the clear events of a log that `choice` sets aside. Nothing is marked if they are a large part of the log,
-/// which could then be the normal part; a robot without drives never is.
+/// Marks the clear events of a log that are excluded from the fit according to `choice`. Nothing is marked if the
+/// events are a large part of the log, because this part could be the normal one. A rest with the drives off is never
+/// the normal part.
 fn set_aside(search: &mut EventSearch, choice: EventChoice, max_share: f64) {
     let is_marked = |event: &LogEvent| event.clear && choice.sets_aside(event.kind);
     let can_be_normal = |event: &&LogEvent| is_marked(event) && event.kind != EventKind::DrivesOff;
@@ -77,8 +78,8 @@ fn set_aside(search: &mut EventSearch, choice: EventChoice, max_share: f64) {
     }
 }
 
-/// The recordings without the torque of the intervals that are set aside in logs of this role; `None` if there are
-/// none. Motion and clock keep all rows, so that no filter starts again.
+/// The recordings with this role, without the torque of excluded intervals; `None` if no interval is excluded. Motion
+/// and time stamps keep all rows, so that no filter starts again.
 pub(crate) fn without_intervals(
     recordings: &[Recording],
     events: &[RecordingEvents],
@@ -103,13 +104,14 @@ pub(crate) fn without_intervals(
     changed
 }
 
-/// Start and end of the intervals that are set aside, s.
+/// Start and end of the excluded intervals, s.
 pub(crate) fn left_out(search: &EventSearch) -> Vec<[f64; 2]> {
     let set_aside = search.events.iter().filter(|event| event.set_aside);
     set_aside.map(|event| left_out_s(search, event)).collect()
 }
 
-/// Interval of an event, longer at both ends by one bin; by three around a filled hole, whose positions are wrong too.
+/// Interval of an event, extended at both ends by one bin. Around a filled hole it is extended by three bins, because
+/// the positions there are wrong, too.
 fn left_out_s(search: &EventSearch, event: &LogEvent) -> [f64; 2] {
     let margin_s = if event.kind == EventKind::Interpolated { 3.0 } else { 1.0 } * search.bin_s;
     [event.from_s - margin_s, event.to_s + margin_s]

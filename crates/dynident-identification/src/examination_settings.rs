@@ -1,36 +1,37 @@
-//! Limits behind the findings of the examination.
+//! Limits of the examination of an estimate.
 
 use crate::limits::{InvalidLimit, check_limits};
 
-/// Limits behind the findings of the examination.
+/// Limits of the examination of an estimate, which decide about its findings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExaminationSettings {
-    /// Largest ratio of the residual with the opposite sign of the torque to that with the sign as given, for which the
-    /// sign is reported as reversed; 0.5.
+    /// Largest ratio of the residual with the opposite torque sign to the residual with the sign as logged, for the
+    /// sign to be reported as reversed. Default 0.5.
     pub max_reversed_ratio: f64,
-    /// Residual with the bodies of the robot description, in percent of the torque, from which the description may be
-    /// of another robot; 50. The residual contains the friction, which is usually less.
+    /// Residual with the bodies of the robot description, percent of the torque, above which the description may be of
+    /// another robot. Default 50. The residual contains the friction, which is usually less.
     pub max_nominal_residual_percent: f64,
-    /// Size of negative friction, in its standard deviations, above which a joint is reported as reversed; 5. On the
-    /// first real logs correct joints stayed above −2.5, dead channels were below −8.
+    /// Size of negative friction divided by its standard deviation, above which a joint is reported as reversed.
+    /// Default 5. On the first real logs, the estimates for correct joints were above −2.5 standard deviations, for
+    /// dead channels below −8.
     pub min_friction_deviations: f64,
-    /// Size of negative friction relative to the residual of the joint (RMS), above which a joint is reported as
-    /// reversed; 0.5. Less may be an unmodelled effect, as for a wrist whose torque is measured behind the gear and is
-    /// mostly noise.
+    /// Size of negative friction relative to the residual of the joint (root mean squares), above which a joint is
+    /// reported as reversed. Default 0.5. Smaller values may result from an unmodelled effect, for example for a wrist
+    /// whose torque is measured after the gear and is mostly noise.
     pub min_friction_ratio: f64,
-    /// Ratio of a higher cut-off of the differentiator to that of the fit; 4. The torque predicted with both shows the
-    /// error from motion above the cut-off of the fit.
+    /// Ratio of a higher differentiator cut-off to that of the fit. Default 4. The difference between the torques
+    /// predicted with both shows the error that motion above the cut-off of the fit causes.
     pub finer_cutoff_ratio: f64,
     /// Share of a held-out log, from its start, that determines its torque offsets if each log has separate offsets,
-    /// from 0 to 1; 0.25. With the usual length of a log, the offset is then better known than the other parameters,
-    /// and most of the log remains as the test.
+    /// from 0 to 1. Default 0.25. With the usual length of a log, the offset is then more accurate than the other
+    /// parameters, and most of the log remains for the test.
     pub offset_share: f64,
-    /// Unexplained torque of a joint with a function of its position, relative to that without it, up to which a spring
-    /// or counterbalance is named; 0.6. Both fits have all parameters of the joint and all friction laws, so that
-    /// without such a torque the ratio is close to 1.
+    /// Unexplained torque of a joint with a function of its position, divided by that without it, below which a spring
+    /// or counterbalance is reported. Default 0.6. Both fits contain all parameters of the joint and all friction laws,
+    /// so the ratio is close to 1 without such a torque.
     pub max_left_by_position: f64,
-    /// Least torque that only the function explains, relative to the torque of the joint (RMS); 0.02. A smaller
-    /// function hardly improves the prediction.
+    /// Minimum torque that only the function of the position explains, relative to the torque of the joint (root mean
+    /// squares). Default 0.02. A smaller function hardly improves the prediction.
     pub min_position_ratio: f64,
 }
 

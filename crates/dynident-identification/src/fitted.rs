@@ -1,4 +1,4 @@
-//! Estimate from recordings: decisions, the last fit, and the terms of its error bars.
+//! Estimate from recordings: decisions, the last fit, and the sources of its error bars.
 
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::{LogVariation, variation_of_logs};
@@ -21,7 +21,7 @@ pub(crate) struct Fitted<'a> {
     pub(crate) choices: Choices,
     pub(crate) lag: LagChoice,
     pub(crate) between_logs: Option<LogVariation>,
-    /// Terms of the estimate's covariance in addition to the noise.
+    /// Covariance of the estimate from sources of error other than noise.
     pub(crate) bars: ErrorBars,
     pub(crate) times: StageTimes,
 }
@@ -78,8 +78,8 @@ struct Excerpt {
     logs_s: f64,
 }
 
-/// Choices of an excerpt. `None` for short logs, and if little is open: with external instruments, a known arm or
-/// unknown gains.
+/// Choices from an excerpt. `None` for short logs, and if few choices are open: with external instruments, a known arm
+/// or unknown gains.
 fn choices_of_excerpt(
     task: &IdentificationTask,
     training: &[usize],
@@ -99,7 +99,7 @@ fn choices_of_excerpt(
     let (robot, payloads, settings) = (robot.clone(), payloads.clone(), settings.clone());
     let task = IdentificationTask { robot, recordings, payloads, settings };
     let mut work = Workspace::new(&task, training, execution, Job::Model(None), None);
-    // The fit of all rows reports errors of the recordings.
+    // The fit to all rows will report errors of the recordings.
     let Ok(()) = decide_all(&DECISIONS, &mut work) else { return Ok(None) };
     let (choices, logs_s) = (work.choices().clone().of_excerpt(task.settings.lags), work.logs_s + read_s);
     drop(work);

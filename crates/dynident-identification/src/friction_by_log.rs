@@ -1,22 +1,22 @@
 //! Separate friction parameters for each log, because friction varies from day to day.
 //!
-//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: logs share bodies and drives; friction and offsets are free in every
-//! log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
+//! For each log l, `τ_l = W_b θ_b + W_f θ_{f,l}`: all logs share the parameters θ_b of bodies and drives, while
+//! friction and offsets θ_{f,l} are free in every log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
 
 use dynident_dynamics::Column;
 use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
 
-/// Maximum number of log groups with separate friction. Neighbouring logs share a group, because every group adds
-/// columns.
+/// Maximum number of log groups with separate friction. Because every group adds columns, successive logs share a group
+/// if there are more logs.
 const MAX_GROUPS: usize = 8;
 
-/// Whether a base parameter is torque of a single joint, which can vary from day to day.
+/// Whether a base parameter belongs to a torque of a single joint, which can vary from day to day.
 pub(crate) fn is_friction_column(column: &Column) -> bool {
     matches!(column, Column::Term(term) if !term.is_drive_inertia())
 }
 
-/// Adds friction columns for the log groups after the first, whose columns are unchanged. `None` for a single log, and
-/// with a prior, which does not cover the added columns.
+/// Adds friction columns for each log group except the first, which keeps the existing columns. `None` for a single
+/// log, and with a prior, because the prior has no values for the added columns.
 pub(crate) fn with_friction_by_log(
     problem: &LinearProblem,
     is_friction: &[bool],

@@ -28,55 +28,59 @@ use dynident_recording::MotionSettings;
 use dynident_rows::{Execution, RegressorModel, Role, of_role};
 use std::time::Instant;
 
-/// An identified model with all intermediate results.
+/// An identified model, with all intermediate results.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Identification {
-    /// Motion settings in use, with one cut-off for all recordings.
+    /// Settings of the differentiation that were used, with one cut-off for all recordings.
     pub motion: MotionSettings,
-    /// Evidence for the cut-off; `None` if it was stated or the recordings are too short to compare cut-offs.
+    /// Comparison of cut-offs; `None` if the settings state the cut-off or the recordings are too short to compare
+    /// cut-offs.
     pub cutoff: Option<CutoffByError>,
-    /// Cut-off whose band the held-out figures use if the fit has another one, hertz.
+    /// Cut-off of the frequency band for held-out errors, hertz; `None` if they use the band of the fit.
     pub motion_hz: Option<f64>,
-    /// Test of drive inertia; `None` if terms state it.
+    /// Test of drive inertia; `None` if the robot's terms state it.
     pub drive_inertia: Option<DriveInertiaChoice>,
-    /// Factors of the training recordings, the model with the selected friction, payload columns, gains.
+    /// Triangular factors of the training recordings, the model with the selected friction, columns of payloads, and
+    /// torque gains.
     pub training: Training,
-    /// Estimator in use; for `auto` the selected one.
+    /// Estimator that was used; for `auto` the selected one.
     pub estimator: Estimator,
     /// Result of the estimator, with error bars from the residuals only.
     pub estimation: Estimation,
-    /// Further terms of the error bars.
+    /// Other sources of error in the error bars.
     pub bars: ErrorBars,
-    /// Estimate with all terms in its error bars. Inessential parameters are held at zero if the settings require it.
+    /// Estimate whose error bars include all sources of error. Inessential parameters are fixed at zero if the settings
+    /// require it.
     pub estimate: Estimate,
-    /// Parameters held at zero because the data hardly determine them, if requested.
+    /// Parameters that were fixed at zero because the data hardly determine them; `None` unless requested.
     pub essential: Option<EssentialReport>,
-    /// Bodies, friction and drives.
+    /// Physically consistent parameters of bodies, friction and drives.
     pub consistent: ConsistentParameters,
     /// Estimated payloads.
     pub payloads: Vec<PayloadResult>,
-    /// Delays and torque traces of the training recordings.
+    /// Lags of the torque in the training recordings, and measured and predicted torque over time.
     pub examination: TrainingExamination,
     /// Tests on recordings that were not used for the fit.
     pub held_out: Vec<HeldOutExamination>,
-    /// Alternative hypotheses about the recordings; `None` if the fit gave no reason to test them, and for payloads.
+    /// Comparison of hypotheses about mistakes in the study; `None` if the fit gave no reason for it, and for payloads.
     pub diagnosis: Option<Diagnosis>,
-    /// The model in each class of forms; empty for payloads on a known arm and with unknown gains.
+    /// The model as each class of export formats can represent it; empty for payloads on a known arm and with unknown
+    /// gains.
     pub forms: Vec<FormFit>,
     /// The compensated lag of the torque and its remaining uncertainty.
     pub torque_lag: LagChoice,
-    /// Variation between training logs beyond their own error bars, which is included in the error bars of the
-    /// estimate; `None` for a single log.
+    /// Variation of the parameters between training logs beyond their error bars, which the error bars of the estimate
+    /// include; `None` for a single log.
     pub between_logs: Option<LogVariation>,
-    /// Events in the recordings; intervals that are set aside are not in the rows of the fit.
+    /// Events in the recordings. Intervals of events may be excluded from the fit.
     pub events: Vec<RecordingEvents>,
-    /// Time of the stages.
+    /// Computing time of each stage.
     pub times: StageTimes,
 }
 
 impl Identification {
-    /// Terms, base parameters and layout.
+    /// Robot model with its torque terms, base parameters and regressor columns.
     pub fn model(&self) -> &RegressorModel {
         &self.training.model
     }
@@ -91,22 +95,22 @@ impl Identification {
         &self.estimate.values[..self.training.columns.base()]
     }
 
-    /// Inertial parameters of all bodies, from the consistent set if available.
+    /// Inertial parameters of all bodies, from the physically consistent set if available.
     pub fn inertials(&self) -> Vec<InertialParameters> {
         inertials(self.model().model(), &self.consistent.parameters)
     }
 
-    /// Base parameters of the consistent set, if available.
+    /// Base parameters of the physically consistent set, if available.
     pub fn consistent_base_values(&self) -> Option<&[f64]> {
         self.consistent.fit.as_ref().map(|fit| &fit.base_values[..])
     }
 }
 
-/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others. The
-/// stages are rows and factors, estimate, consistent parameters, examination and held-out examination. Each can be
-/// called separately: [`Logs::new`](crate::Logs::new), [`training_rows`](crate::training_rows),
-/// [`estimate`](crate::estimators::estimate()), [`consistent_stage`](crate::consistent_stage),
-/// [`examine_training`](crate::examination::examine_training),
+/// Fits a robot model to the recordings with the role [`Identify`](Role::Identify) and tests it on the others. The
+/// stages are: rows and triangular factors, estimate, physically consistent parameters, examination, and held-out
+/// examination. Each stage can be called separately: [`Logs::new`](crate::Logs::new),
+/// [`training_rows`](crate::training_rows), [`estimate`](crate::estimators::estimate()),
+/// [`consistent_stage`](crate::consistent_stage), [`examine_training`](crate::examination::examine_training),
 /// [`examine_held_out`](crate::examination::examine_held_out).
 ///
 /// # Errors
@@ -115,10 +119,10 @@ pub fn identify(task: &IdentificationTask, execution: Execution<'_>) -> Result<I
     execution.install(|| identified(task, execution, Job::Model(None)))
 }
 
-/// As [`identify()`] with instruments from `source`: a simulation of the closed loop with the current model (IDIM-IV:
-/// call again with a new simulation until the parameters converge), or a repeated run.
-/// [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) uses them for the estimate; other estimators
-/// are tested with them.
+/// As [`identify()`], with instrumental variables from `source`. This can be a simulation of the closed loop with the
+/// current model (method IDIM-IV: call again with a new simulation until the parameters converge), or a repeated run.
+/// [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) uses the instruments for the estimate; other
+/// estimators are only tested with them.
 ///
 /// # Errors
 /// As [`identify()`], and errors of `source`.
@@ -130,9 +134,9 @@ pub fn identify_with_instruments(
     execution.install(|| identified(task, execution, Job::Model(Some(source))))
 }
 
-/// Identifies payloads on a known arm; their error bars include those of the arm. `task.robot` must have the torque
-/// terms of the arm's own identification. The bodies of the arm are not estimated again, its friction and torque
-/// offsets only as [`KnownArm::refit`] states.
+/// Identifies payloads on a known arm. The error bars of the payloads include the uncertainty of the arm. `task.robot`
+/// must have the torque terms with which the arm was identified. The bodies of the arm are not estimated again; its
+/// friction and torque offsets are estimated again only if [`KnownArm::refit`] states this.
 ///
 /// # Errors
 /// As [`identify()`].
@@ -233,7 +237,7 @@ fn identified(
     })
 }
 
-/// Holds parameters at zero that the data hardly determine, if requested.
+/// Fixes parameters at zero that the data hardly determine, if requested.
 fn without_inessential(
     estimate: Estimate,
     settings: &IdentificationSettings,

@@ -1,10 +1,10 @@
-//! Drive inertia that a study leaves open.
+//! Drive inertia that a study does not state, so that the logs decide about it.
 
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::{ParametricModel, ParametricModelError};
 use dynident_model::terms::{DriveInertia, TorqueTerm, sort_terms};
 
-/// The robot with every drive inertia that `settings.drive_inertia` leaves open, before any test.
+/// The robot with the drive inertia of all joints in `settings.drive_inertia`, before any test.
 pub(crate) fn with_drives_left_to_the_logs(
     robot: &ParametricModel,
     settings: &IdentificationSettings,
@@ -12,7 +12,7 @@ pub(crate) fn with_drives_left_to_the_logs(
     with_drives(robot, &joints_left_to_the_logs(robot, settings))
 }
 
-/// Joints with open drive inertia that is not yet among the robot's terms.
+/// Joints in `settings.drive_inertia` that have no drive inertia among the robot's terms yet.
 pub(crate) fn joints_left_to_the_logs(robot: &ParametricModel, settings: &IdentificationSettings) -> Vec<usize> {
     let known = |joint: &usize| robot.terms().contains(&TorqueTerm::DriveInertia(DriveInertia { joint: *joint }));
     let named = settings.drive_inertia.iter().filter_map(|name| robot.model().joint_index(name));

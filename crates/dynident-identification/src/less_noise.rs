@@ -1,4 +1,4 @@
-//! A lower motion cut-off after `auto` selected instruments.
+//! Repetition of the fit with a lower cut-off of the positions, after `auto` selected instrumental variables.
 
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSettings, NoiseInRegressor, estimate};
@@ -10,7 +10,7 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimateStatus;
 use dynident_rows::Logs;
 
-/// Rows, estimate and their settings, with the estimator that `auto` selected and the lag in use.
+/// Rows, estimate and settings, with the estimator that `auto` selected and the currently compensated lag.
 pub(crate) struct Fit<'a> {
     pub(crate) logs: Logs<'a>,
     pub(crate) training: Training,
@@ -21,10 +21,10 @@ pub(crate) struct Fit<'a> {
 /// Reason for keeping the stated friction in this case.
 const NOISE_REASON: &str = "position noise biases the least squares that would select it";
 
-/// Applies the estimator that `auto` selected; `robot` has the drive inertia of the test. If `auto` selected
-/// instruments and the cut-off is automatic, rows and estimate are computed again with a cut-off that lets less noise
-/// into the regressor, and with friction as stated. Least squares, held-out errors and delays then describe the robot
-/// and not the noise.
+/// Applies the estimator that `auto` selected; `robot` has the drive inertia that resulted from the test. If `auto`
+/// selected instrumental variables and the cut-off is automatic, rows and estimate are computed again, with the stated
+/// friction and a cut-off that passes less noise to the regressor. Least squares, held-out errors and lags are then not
+/// dominated by noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
     robot: &ParametricModel,
@@ -42,7 +42,7 @@ pub(crate) fn with_less_noise<'a>(
         return Ok(found);
     }
     let (logs, before) = if is_lower {
-        // Above the lower cut-off there is only noise, so held-out figures use the band below it.
+        // There is only noise above the lower cut-off, so held-out errors are for the frequency band below it.
         let execution = found.logs.execution;
         let lower =
             Logs::new(robot.model(), recordings, found.settings.row_settings(), chosen, Some(lower_hz), execution)?;
@@ -50,7 +50,7 @@ pub(crate) fn with_less_noise<'a>(
     } else {
         (found.logs, None)
     };
-    // Friction was selected by least squares, which the noise biases.
+    // The previous friction was selected by least squares, which the noise biases.
     let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISE_REASON);
     let friction_choice = found.training.friction_choice.iter().map(as_stated).collect();
     let training = training_rows(&logs, &found.settings, robot.clone().into(), chosen, payloads, None)?;
@@ -60,7 +60,7 @@ pub(crate) fn with_less_noise<'a>(
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
             return Ok(Fit { logs: before.unwrap_or(logs), ..found });
         }
-        // The verdict belongs to the rows in which the noise was found.
+        // The verdict belongs to the rows in which the noise was detected.
         (again.verdict, again.fast_motion, again.hausman) = (noise.verdict, noise.fast_motion, noise.hausman);
         (again.least_squares, again.instruments_taken) = (noise.least_squares, true);
         again.cutoff_before_hz = before_hz.filter(|_| is_lower);
@@ -68,8 +68,8 @@ pub(crate) fn with_less_noise<'a>(
     Ok(Fit { logs, training, estimation, settings: found.settings })
 }
 
-/// Puts the estimator that `auto` selected into the settings. Returns the cut-off of the instruments, hertz, and the
-/// findings on noise if instruments were selected.
+/// Stores the estimator that `auto` selected in the settings. If it is instrumental variables, returns the cut-off of
+/// the instruments, hertz, and the findings about noise.
 pub(crate) fn take_estimator(found: &mut Fit<'_>) -> Option<(f64, NoiseInRegressor)> {
     let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return None };
     let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);

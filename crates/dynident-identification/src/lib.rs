@@ -115,8 +115,8 @@
 //! | the rows | [`LogPass`](rows::LogPass) with a custom [`RowConsumer`](rows::RowConsumer) |
 //! | a progress bar | [`Progress`] in [`Execution`] |
 //!
-//! A recording that fits into memory is read and differentiated once, for any number of passes; of a longer one only
-//! factors are kept. The result does not depend on the number of threads.
+//! A recording that fits into memory is read and differentiated once, for any number of passes; of a longer one, only
+//! triangular factors are kept. The result does not depend on the number of threads.
 
 #![forbid(unsafe_code)]
 

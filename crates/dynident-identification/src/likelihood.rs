@@ -2,7 +2,8 @@
 
 use dynident_estimation::{Estimate, LinearProblem};
 
-/// −2 ln of the likelihood with the estimated noise of every joint, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
+/// Deviance of a fit (minus two times the logarithm of the likelihood) with the estimated noise of every joint, up to a
+/// constant that depends on the rows: `Σ_j n_j ln σ_j²` for n_j rows and residual standard deviation σ_j of joint j.
 pub(crate) fn deviance(problem: &LinearProblem, joint_sigma: &[f64]) -> f64 {
     let of_joint = |(rows, sigma): (usize, &f64)| deviance_of_joint(rows, *sigma);
     problem.joint_rows().into_iter().zip(joint_sigma).map(of_joint).sum()
@@ -12,18 +13,18 @@ fn deviance_of_joint(rows: usize, sigma: f64) -> f64 {
     rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln()
 }
 
-/// Fit of one joint's rows, and its number of parameters.
+/// Quality of the fit to one joint's rows, and the number of parameters of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct JointScore {
     pub(crate) rows: usize,
-    /// Standard deviation of the residual, in units of the torque.
+    /// Standard deviation of the residual, in the unit of the torque.
     pub(crate) sigma: f64,
     pub(crate) own: usize,
 }
 
 impl JointScore {
-    /// Bayesian information criterion of a joint whose rows contain the information of `1 / design_effect` as many
-    /// independent rows (Kish, *Survey Sampling*, 1965, 8.2). Smaller is better; 0 for a joint without rows.
+    /// Bayesian information criterion of a joint with correlated rows: `design_effect` rows contain as much information
+    /// as one independent row (Kish, *Survey Sampling*, 1965, 8.2). Smaller is better; 0 for a joint without rows.
     ///
     /// Source of the correction: Rao and Scott, Annals of Statistics 12 (1984) 46.
     pub(crate) fn bic(&self, design_effect: f64) -> f64 {

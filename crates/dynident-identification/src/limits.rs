@@ -6,9 +6,9 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("limit {name} = {value}: give a finite number above zero")]
 pub struct InvalidLimit {
-    /// The field of the settings.
+    /// Name of the setting.
     pub name: &'static str,
-    /// Its value.
+    /// Value of the setting.
     pub value: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Triangular factors of one recording.
+//! Triangular factors of the rows of one recording.
 
 use crate::examination::PriorAgreement;
 use crate::settings::IdentificationSettings;
@@ -11,31 +11,32 @@ use rayon::prelude::*;
 pub struct LogFactors {
     /// Index of the recording.
     pub index: usize,
-    /// One factor of `[W | τ]` for each joint, divided into time segments.
+    /// One triangular factor of `[W | τ]` (regressor W, torque τ) for each joint, divided into time segments.
     pub factors: Vec<SegmentedFactor>,
     /// Import report and statistics of the pass.
     pub statistics: LogStatistics,
-    /// Contribution of position noise to the rows, one factor for each joint. `None` until the model is selected, and
-    /// if the noise is unknown.
+    /// Contribution of position noise to the rows, one triangular factor for each joint. `None` until the model is
+    /// selected, and if the noise is unknown.
     pub noise: Option<Vec<SegmentedFactor>>,
-    /// Fit of the nominal values, if they are known and torque is in newton metres; for the model given to
-    /// [`training_rows`](crate::training_rows).
+    /// Agreement of the log with the nominal values, if they are known and the torque is in newton metres; for the
+    /// model that was given to [`training_rows`](crate::training_rows).
     pub nominal_agreement: Option<PriorAgreement>,
 }
 
 impl LogFactors {
-    /// Merges each joint's rows into one segment, sufficient for values and for error bars from white noise.
+    /// Merges each joint's rows into one time segment. This is sufficient for the values, and for error bars that
+    /// assume white noise.
     pub(crate) fn as_one_segment(&self) -> Self {
         let factors = self.factors.par_iter().map(SegmentedFactor::as_one_segment).collect();
         let (statistics, nominal_agreement) = (self.statistics.clone(), self.nominal_agreement.clone());
         Self { index: self.index, factors, statistics, noise: self.noise.clone(), nominal_agreement }
     }
 
-    /// Rows for another model whose columns are a subset of those of `wide`.
+    /// Rows for another model, whose columns are a subset of the columns of `wide`.
     pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
         self.factors.par_iter_mut().enumerate().try_for_each(|(joint, factor)| {
             let seen = wide.layout().joint_columns(joint);
-            // A missing column gets an index out of range, which the selection rejects.
+            // A missing column gets an index out of range, which the selection of columns rejects.
             let place = |&column: &usize| {
                 let wanted = &model.layout().columns()[column];
                 seen.iter().position(|&global| wide.layout().columns()[global] == *wanted).unwrap_or(usize::MAX)
@@ -84,7 +85,7 @@ impl RowConsumer for JointFactor {
     }
 }
 
-/// Computes the factors of recording `index`; `alone` allows a reader thread.
+/// Computes the triangular factors of recording `index`; `alone` allows a second thread that reads the file.
 ///
 /// # Errors
 /// The recording cannot be read.

@@ -1,11 +1,11 @@
-//! Noise level of every joint in each log, used to weight logs.
+//! Noise level of every joint in each log, from which logs get their weights.
 
 use crate::estimators::{EstimationSettings, Estimator};
 use dynident_estimation::{EstimationError, LinearProblem, weighted_values};
 
-/// Maximum number of passes.
+/// Maximum number of iterations.
 const MAX_PASSES: usize = 20;
-/// Relative change of a noise level at which the passes end.
+/// Relative change of a noise level below which the iterations end.
 const MAX_RELATIVE_CHANGE: f64 = 1e-3;
 
 /// Minimum noise of a log relative to the noisiest log; smaller values are rounding errors.
@@ -17,13 +17,14 @@ pub enum LogNoise {
     /// One noise level for each joint.
     #[default]
     Shared,
-    /// Separate noise levels for each log: `σ_jℓ = √(‖τ_jℓ - W_jℓ θ‖² / rows)` and θ by weighted least squares
-    /// alternate until they converge. Residuals are then in units of the last log. Not available for ordinary least
-    /// squares and for a caller's rule. For estimators that read the logs again it only affects the consistent set.
+    /// Separate noise levels for each log. The noise `σ_jℓ = √(‖τ_jℓ - W_jℓ θ‖² / rows)` of joint j in log ℓ and the
+    /// weighted least-squares estimate θ are computed alternately until they converge. The rows are scaled to the noise
+    /// of the last log. Not available for ordinary least squares and for an estimator of the caller. For estimators
+    /// that read the logs again, this setting affects only the physically consistent set.
     Own,
 }
 
-/// Scales the rows of each joint and log to the last log's noise of that joint.
+/// Scales the rows of each joint and log so that their noise equals the noise of the joint in the last log.
 pub(crate) fn weighted_by_log(
     settings: &EstimationSettings,
     problem: LinearProblem,
@@ -49,7 +50,8 @@ pub(crate) fn weighted_by_log(
     problem.with_log_weights(|log, joint| weights[log][joint])
 }
 
-/// For each log and joint the ratio of the last log's noise (with rows of the joint) to its own noise.
+/// Weights for each log and joint: the noise of the joint in the last log (with rows of the joint), divided by its
+/// noise in this log.
 fn weights_by(problem: &LinearProblem, theta: &[f64]) -> Result<Vec<Vec<f64>>, EstimationError> {
     let (logs, joints) = (problem.logs().len(), problem.joints().len());
     let mut noise = vec![vec![0.0_f64; joints]; logs];

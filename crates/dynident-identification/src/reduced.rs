@@ -1,8 +1,8 @@
-//! Logs reduced to their factors: a fit of many logs that can be stored at different places.
+//! Reduction of logs to triangular factors, for fits to many logs that may be stored at different places.
 //!
-//! [`reduce`] converts each log to its triangular factors; [`identify_reduced`] fits the model to the factors only, as
-//! [`identify`](crate::identify()) would to the logs. The samples are not read again, so cut-off, drives and friction
-//! must be stated, and the estimator is least squares.
+//! [`reduce`] converts each log to triangular factors. [`identify_reduced`] fits the model to these factors with the
+//! same result as [`identify`](crate::identify()) from the logs. The samples are not read again, so the settings must
+//! state cut-off, drive inertia and friction, and the estimator must be least squares.
 
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::variation_of_logs;
@@ -23,26 +23,27 @@ use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_rows::{Execution, LogStatistics, Logs, Recording, RegressorModel, Role, of_role};
 use std::time::Instant;
 
-/// A log reduced to its factors.
+/// A log that was reduced to triangular factors.
 #[derive(Clone, Debug)]
 pub struct ReducedLog {
     /// Name of the log.
     pub name: String,
-    /// One factor of `[W | τ]` for each joint, divided into time segments; columns as
-    /// [`joint_columns`](dynident_dynamics::PanelLayout::joint_columns) of the model's layout.
+    /// One triangular factor of `[W | τ]` (regressor W, torque τ) for each joint, divided into time segments; columns
+    /// as [`joint_columns`](dynident_dynamics::PanelLayout::joint_columns) of the model's layout.
     pub factors: Vec<SegmentedFactor>,
-    /// Contribution of position noise to the rows, in the same layout; `None` if the noise is unknown.
+    /// Contribution of position noise to the rows, as triangular factors with the same columns; `None` if the noise is
+    /// unknown.
     pub noise: Option<Vec<SegmentedFactor>>,
-    /// Statistics of the pass, without the import report.
+    /// Statistics from reading the log, without the import report.
     pub statistics: LogStatistics,
 }
 
-/// Reduces every recording with the role [`Identify`](Role::Identify) to factors with at most `segments` segments for
-/// each joint. Memory does not grow with the length of a log. More segments improve the error bars of few logs; with
-/// many logs, one segment per log is sufficient. A stated lag is compensated.
+/// Reduces every recording with the role [`Identify`](Role::Identify) to triangular factors with at most `segments`
+/// time segments for each joint. Memory does not grow with the length of a log. More segments improve the error bars of
+/// few logs; with many logs, one segment per log is sufficient. A stated lag is compensated.
 ///
 /// # Errors
-/// [`ReduceError`] if a choice is open; recordings cannot be read.
+/// [`ReduceError`] if the settings leave a choice to the logs; recordings cannot be read.
 pub fn reduce(
     task: &IdentificationTask,
     segments: usize,
@@ -66,7 +67,7 @@ pub fn reduce(
             Ok(ReducedLog {
                 name: recordings[log.index].name.clone(),
                 factors: few(log.factors, segments)?,
-                // The time of the noise is irrelevant.
+                // The time segment of the noise is irrelevant.
                 noise: log.noise.map(|noise| few(noise, 1)).transpose()?,
                 statistics: LogStatistics { report: None, ..log.statistics },
             })
@@ -75,10 +76,11 @@ pub fn reduce(
     })
 }
 
-/// Fits a model to reduced logs: the estimate with the variation between logs in its error bars, consistent parameters,
-/// signs of torque and friction. Compared with [`identify`](crate::identify()), results that need samples are missing:
-/// delays, torque traces, alternative hypotheses, held-out tests. The result does not depend on where the logs were
-/// reduced; their order only changes rounding.
+/// Fits a model to reduced logs. The result contains the estimate (with the variation between logs in its error bars),
+/// physically consistent parameters, and tests of the signs of torque and friction. Unlike the result of
+/// [`identify`](crate::identify()), it lacks everything that needs samples: lags, torque over time, comparison of
+/// hypotheses, and held-out tests. It does not depend on where the logs were reduced; their order only changes rounding
+/// errors.
 ///
 /// # Errors
 /// [`ReduceError`] as [`reduce`]; factors of other columns; as [`identify`](crate::identify()).
@@ -152,7 +154,7 @@ fn identified(
     })
 }
 
-/// Disables everything that reads samples again.
+/// The settings without everything that reads samples again.
 fn without_second_look(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut own = settings.clone();
     if let Estimator::Auto(_) = own.estimation.estimator {
@@ -164,7 +166,7 @@ fn without_second_look(settings: &IdentificationSettings) -> IdentificationSetti
     own
 }
 
-/// The factors of a reduced log, checked against the columns of the model.
+/// Triangular factors of a reduced log, after a check of their columns against the model.
 fn log_factors(model: &RegressorModel, index: usize, log: &ReducedLog) -> Result<LogFactors, EstimationError> {
     let fits = |what: &str, factors: &[SegmentedFactor]| {
         let mismatch = |what: String, expected, found| Err(EstimationError::Mismatch { what, expected, found });
@@ -191,8 +193,8 @@ fn log_factors(model: &RegressorModel, index: usize, log: &ReducedLog) -> Result
     })
 }
 
-/// Unexplained torque of base parameters `theta`: `‖τ − Wθ‖ / ‖τ‖` of every reduced log, percent; `None` for a log
-/// without torque. Exact, and computed from the factors.
+/// Torque error of the base parameters θ (`theta`) on every reduced log: `‖τ − Wθ‖ / ‖τ‖` with torque τ and regressor
+/// W, percent; `None` for a log without torque. It is exact, although it is computed from the triangular factors.
 ///
 /// # Errors
 /// Factors of other columns.

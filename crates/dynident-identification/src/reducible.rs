@@ -1,4 +1,4 @@
-//! Whether logs can be reduced to factors: no choice may need the samples of all logs.
+//! Check whether logs can be reduced to triangular factors: no choice may need the samples of all logs.
 
 use crate::error::ReduceError;
 use crate::estimators::Estimator;

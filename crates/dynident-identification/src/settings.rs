@@ -13,56 +13,57 @@ use dynident_recording::MotionSettings;
 use dynident_rows::{ParallelFilterSettings, RowSettings};
 use serde::{Deserialize, Serialize};
 
-/// Constant torques of the joints in several training logs.
+/// Whether the constant torque of a joint is the same in all training logs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum OffsetChoice {
-    /// One offset for each joint.
+    /// One offset for each joint, common to all logs.
     #[default]
     Shared,
-    /// Separate offsets for each training log; base parameters and joints use their mean. Zeros of torque sensors drift
-    /// from day to day.
+    /// Separate offsets for each training log, because zeros of torque sensors drift from day to day. The base
+    /// parameters contain the mean over the logs.
     PerLog,
 }
 
-/// Source of the torque gains.
+/// Source of the torque gains (torque per logged unit).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum GainChoice {
-    /// The format: torque columns are in newton metres after units and scales are applied.
+    /// Stated by the log format: torque columns are in newton metres after units and scales are applied.
     #[default]
     Stated,
-    /// The logs: one gain per joint, estimated from logs without and with a known payload.
+    /// Estimated from the logs: one gain per joint, from logs without and with a known payload.
     Unknown,
 }
 
-/// Lags that may be compensated.
+/// Kinds of lags that may be compensated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LagCandidates {
     /// One lag for all joints, or separate lags of joints that clearly differ.
     #[default]
     CommonOrJoints,
-    /// One lag for all joints. For runs under one controller: friction looks like a different lag at each joint, which
-    /// varies between runs.
+    /// Only one lag for all joints. Used for runs with a controller, where unmodelled friction looks like a lag that
+    /// differs between joints and varies between runs.
     Common,
 }
 
-/// When alternative hypotheses about the logs are tested: see [`diagnosis`](crate::diagnosis).
+/// Whether hypotheses about mistakes in the study are tested; see [`diagnosis`](crate::diagnosis).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DiagnosisChoice {
     /// Never.
     Never,
-    /// If the fit is doubtful: the residual of a consistent robot is clearly larger than that of separate parameters
-    /// for each joint, friction drives a joint, or a joint is beyond its limits.
+    /// If the fit is doubtful: the residual of a physically consistent robot is clearly larger than that of separate
+    /// parameters for each joint, friction drives a joint (negative friction), or a joint exceeds its limits.
     #[default]
     WhenDoubtful,
     /// Always.
     Always,
 }
 
-/// Settings of [`identify`](crate::identify()). The default is weighted least squares with consistent parameters.
+/// Settings of [`identify`](crate::identify()). The default is weighted least squares with physically consistent
+/// parameters.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationSettings {
@@ -74,34 +75,34 @@ pub struct IdentificationSettings {
     pub estimation: EstimationSettings,
     /// Prior knowledge of the bodies; `None` skips the physically consistent fit.
     pub consistency: Option<ConsistencySettings>,
-    /// Whether to compute intervals of every parameter over all consistent sets that the data do not reject. It takes
-    /// some thousand fits; off by default.
+    /// Whether to compute intervals of every parameter over all physically consistent sets that the data do not reject.
+    /// This takes some thousand fits; off by default.
     pub intervals: bool,
-    /// Joints whose drive inertia is tested, all together; it is added to the model if the test is positive. Empty by
-    /// default. Joints with a stated drive inertia are skipped.
+    /// Joints whose drive inertia is tested, with one test for all of them. If the test is positive, it is added to the
+    /// model. Joints with a stated drive inertia are skipped. Empty by default.
     pub drive_inertia: Vec<String>,
-    /// Source of the joints' friction; the terms of the robot by default.
+    /// Source of the joints' friction; the terms of the robot model by default.
     pub friction: FrictionSource,
-    /// Whether training logs share their offsets; they do by default.
+    /// Whether training logs share one torque offset per joint (default) or have separate offsets.
     pub offsets: OffsetChoice,
-    /// Whether training logs share the noise of their joints; they do by default.
+    /// Whether training logs share one noise level per joint (default) or have separate noise levels.
     pub log_noise: LogNoise,
-    /// Lags of the torque that may be compensated if no lag is stated.
+    /// Kinds of lags that may be compensated if no lag is stated.
     pub lags: LagCandidates,
-    /// Whether torque is in newton metres; it is by default.
+    /// Whether the torque columns are in newton metres (default) or have unknown gains.
     pub gains: GainChoice,
-    /// Relative standard deviation of stated gains, independent between joints; it enters the error bars of payloads.
-    /// Zero by default.
+    /// Relative standard deviation of stated torque gains, independent between joints; the error bars of payloads
+    /// include it. Zero by default.
     pub gain_std: f64,
-    /// When alternative hypotheses about the training logs are tested; by default if the fit is doubtful.
+    /// Whether hypotheses about mistakes in the study are tested; by default only if the fit is doubtful.
     pub diagnosis: DiagnosisChoice,
-    /// Thresholds of decisions and of the doubt about a study.
+    /// Thresholds for decisions, and for treating a fit as doubtful.
     pub thresholds: DecisionThresholds,
-    /// Limits behind the verdicts of that comparison.
+    /// Limits for the test of hypotheses about mistakes in the study.
     pub diagnosis_limits: DiagnosisSettings,
-    /// Limits of the examination that decide whether the fit is doubtful.
+    /// Limits for the examination of the estimate, which decide whether the fit is doubtful.
     pub examination: ExaminationSettings,
-    /// Search for intervals of the logs that no single model explains.
+    /// Settings of the search for intervals of the logs that no single model explains.
     pub events: EventSettings,
 }
 
@@ -135,7 +136,7 @@ impl IdentificationSettings {
         RowSettings { motion: &self.motion, parallel_filter: &self.parallel_filter }
     }
 
-    /// Share of a held-out log that determines its own offsets; `None` if all logs share the offsets.
+    /// Share of a held-out log that determines separate offsets of this log; `None` if all logs share the offsets.
     pub fn held_out_offset_share(&self) -> Option<f64> {
         (self.offsets == OffsetChoice::PerLog).then_some(self.examination.offset_share)
     }

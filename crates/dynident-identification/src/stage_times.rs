@@ -1,10 +1,10 @@
-/// Time of the stages of an identification, s.
+/// Computing time of the stages of an identification, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
-    /// From logs to factors.
+    /// Time for reducing the logs to triangular factors.
     pub logs_s: f64,
-    /// From factors to parameters.
+    /// Time for computing the parameters from the factors.
     pub estimation_s: f64,
-    /// Delays, traces and held-out recordings.
+    /// Time for lags, torque over time and held-out recordings.
     pub examination_s: f64,
 }

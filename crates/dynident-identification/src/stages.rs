@@ -1,4 +1,4 @@
-//! Stages after the estimate: consistent parameters, examination, held-out tests, diagnosis.
+//! Stages after the estimate: physically consistent parameters, examination, held-out tests, diagnosis.
 
 use crate::changes::{Differences, RestoredBody, knowledge_of, restored_errors};
 use crate::consistent::{
@@ -27,23 +27,26 @@ use std::time::Instant;
 /// Physically consistent parameters of an estimate.
 #[derive(Clone, Debug)]
 pub struct ConsistentParameters {
-    /// The consistent set with the best fit; `None` if not requested or not found.
+    /// The physically consistent set with the best fit; `None` if not requested or not found.
     pub fit: Option<PhysicalFit>,
-    /// Reason for a missing consistent set.
+    /// Reason why there is no physically consistent set.
     pub failure: Option<String>,
-    /// All parameters, ten for each body and one for each term. They belong to the consistent set, or otherwise to the
-    /// set nearest to the nominal one that has the estimated base parameters.
+    /// All parameters: ten for each body, then one for each friction or drive term. They are those of the physically
+    /// consistent set. Without such a set, they are the set that has the estimated base parameters and is nearest to
+    /// the nominal values.
     pub parameters: Vec<f64>,
-    /// Standard deviation of each of `parameters` ([`parameter_std`]); `None` without a consistent set, and for bodies
-    /// without nominal inertia.
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); `None` without a physically consistent set, and
+    /// for bodies without nominal inertia.
     pub parameter_std: Vec<Option<f64>>,
     /// Which bodies differ from the robot description; `None` without a description of all bodies.
     pub differences: Option<Differences>,
-    /// Whether the consistent set follows an explanation of these differences by one or two bodies.
+    /// Whether the physically consistent set follows an explanation of these differences by one or two bodies, so that
+    /// the other bodies keep the values of the description.
     pub follows_explanation: bool,
-    /// Torque error after each body is restored to the description, by body; empty without `differences`.
+    /// Torque error for each body if the body gets the values of the description again; empty without `differences`.
     pub restored: Vec<RestoredBody>,
-    /// Intervals of all parameters over all consistent sets that the data do not reject, if requested.
+    /// Intervals of all parameters over all physically consistent sets that the data do not reject; `None` unless
+    /// requested.
     pub intervals: Option<Vec<ParameterInterval>>,
     /// Bodies whose nominal inertia is not physically consistent, with the smallest eigenvalue of their pseudo-inertia.
     pub inconsistent_nominal: Vec<(String, f64)>,
@@ -52,13 +55,13 @@ pub struct ConsistentParameters {
 /// Tests of the estimate on the training recordings.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
-    /// Delays of the torque of each training recording, by joint; `None` if not determined.
+    /// Lag of the torque in each training recording, by joint; `None` if not determined.
     pub delays: Vec<Vec<Option<TorqueLag>>>,
-    /// Measured and predicted torque over time.
+    /// Measured and predicted torque of each training recording over time.
     pub traces: Vec<LogTrace>,
-    /// Delays of all recordings together, by joint.
+    /// Lag of the torque over all recordings together, by joint.
     pub pooled_delays: Vec<Option<TorqueLag>>,
-    /// Fit of consistent sets to the torque with either sign; `None` if a fit fails, and for payloads.
+    /// Residuals of physically consistent sets for both signs of the torque; `None` if a fit fails, and for payloads.
     pub sign: Option<TorqueSignCheck>,
     /// Mean friction of every joint with friction terms; empty for payloads on a known arm.
     pub friction_signs: Vec<FrictionSign>,
@@ -73,7 +76,7 @@ pub(crate) struct Stage<'a> {
     pub(crate) settings: &'a IdentificationSettings,
     pub(crate) training: &'a Training,
     pub(crate) estimate: &'a Estimate,
-    /// Rows and fit with friction as stated, if friction was selected.
+    /// Rows and fit with the friction that the study states, if friction was selected.
     pub(crate) stated_friction: Option<&'a (Training, Estimate)>,
     /// Whether the arm's parameters come from an earlier result.
     pub(crate) arm_is_known: bool,
@@ -83,14 +86,14 @@ pub(crate) struct Stage<'a> {
 
 pub(crate) struct Examined {
     pub(crate) consistent: ConsistentParameters,
-    /// Time from the estimate to the consistent parameters, s.
+    /// Time from the estimate to the physically consistent parameters, s.
     pub(crate) estimation_s: f64,
     pub(crate) held_out: Vec<HeldOutExamination>,
     pub(crate) examination: TrainingExamination,
 }
 
 impl Stage<'_> {
-    /// Computes consistent parameters and all tests, in parallel if the execution allows it.
+    /// Computes the physically consistent parameters and all tests, in parallel if the execution allows it.
     pub(crate) fn examined(&self) -> Result<Examined, IdentificationError> {
         let Self { task, logs, settings, training, estimate, .. } = *self;
         let bodies = || -> Result<_, IdentificationError> {
@@ -104,7 +107,7 @@ impl Stage<'_> {
             let held_out = examine_all_held_out(logs, settings, training, estimate, physical);
             Ok((consistent, estimation_s, held_out))
         };
-        // Stated terms determine the sign, because selection drops friction terms with a wrong sign.
+        // The sign is tested with the stated terms, because the selection drops friction terms with a wrong sign.
         let signs = || match self.stated_friction {
             _ if self.arm_is_known => Ok((None, Vec::new())),
             Some((stated, plain)) => torque_signs(stated, plain),
@@ -157,7 +160,8 @@ impl Stage<'_> {
         Ok(())
     }
 
-    /// Tests for mistakes in the study, if the settings require it or an examination gives reason for doubt.
+    /// Tests hypotheses about mistakes in the study, if the settings require it or the examination shows that the fit
+    /// is doubtful.
     pub(crate) fn diagnosis(
         &self,
         examined: &Examined,
@@ -196,7 +200,8 @@ impl Stage<'_> {
     }
 }
 
-/// Whether the held-out residual exceeds each joint's noise by more than `max_ratio`, root mean square over the joints.
+/// Whether the residual on a held-out log is larger than the noise of the joints by more than the factor `max_ratio`,
+/// root mean square over the joints.
 fn is_far_worse(log: &LogValidation, sigma: &[f64], max_ratio: f64) -> bool {
     let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
@@ -204,8 +209,8 @@ fn is_far_worse(log: &LogValidation, sigma: &[f64], max_ratio: f64) -> bool {
     squares.iter().sum::<f64>() > max_ratio * max_ratio * squares.len() as f64
 }
 
-/// Bodies of a known arm. They belong to the earlier result, so this is the set nearest to the nominal one that has the
-/// estimated base parameters.
+/// Parameters of the bodies of a known arm: the set that has the estimated base parameters and is nearest to the
+/// nominal values. (The physically consistent set belongs to the earlier result.)
 fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
     let robot = &training.model.parametric;
     let settings = task.settings.consistency.as_ref();
@@ -222,8 +227,9 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
     }
 }
 
-/// Finds consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if
-/// requested. A missing consistent set is part of the result.
+/// Computes physically consistent parameters for an estimate with the columns of `training`: the best set, and its
+/// intervals if requested. If there is no physically consistent set, this is not an error; the result contains the
+/// reason.
 ///
 /// # Errors
 /// The factors do not belong to the estimate, or the intervals cannot be computed.
@@ -256,7 +262,7 @@ pub fn consistent_stage(
     let follows_explanation = followed.is_some();
     let fit = followed.or(fit);
     let intervals = match &settings.consistency {
-        // A missing consistent set is explained by `failure`.
+        // If there is no physically consistent set, `failure` contains the reason.
         Some(knowledge) if settings.intervals && fit.is_some() => {
             let progress = logs.execution.progress;
             let found = consistent_intervals(robot, problem, &arm, plain, knowledge, progress);
@@ -265,7 +271,7 @@ pub fn consistent_stage(
         _ => None,
     };
     let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
-    // A successful fit implies a valid problem.
+    // After a successful fit, the problem is known to be valid.
     let mut parameter_std = match knowledge.filter(|_| fit.is_some()) {
         Some(knowledge) => parameter_std(robot, problem, &arm, knowledge).map_err(IdentificationError::Consistency)?,
         None => vec![None; robot.nominal().len()],
@@ -293,8 +299,8 @@ pub fn consistent_stage(
     })
 }
 
-/// Explanations of the difference of an estimate from the description; `None` without a complete description, and if
-/// the covariance is singular.
+/// Explanations of the difference between an estimate and the robot description; `None` without a complete description,
+/// and if the covariance is singular.
 fn description_differences(
     robot: &ParametricModel,
     arm: &Estimate,
@@ -308,15 +314,15 @@ fn description_differences(
     Differences::from_description(robot, &rows, &values, &covariance, knowledge).ok().flatten()
 }
 
-/// Whether a consistent set under an explanation fits the logs as well as the set without it: they do not contradict
-/// it, or not more than they contradict the other one.
+/// Whether a physically consistent set that follows an explanation (`followed`) fits the logs as well as the set
+/// without it (`fit`): the logs do not contradict it, or not more than the other set.
 fn is_as_good(followed: &PhysicalFit, fit: &PhysicalFit, arm: &Estimate) -> bool {
     let is_rejected = followed.difference(arm).is_none_or(|test| test.is_significant);
     followed.status == PhysicalStatus::Solved && (!is_rejected || followed.moved_sigma <= fit.moved_sigma)
 }
 
-/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` if the problem has
-/// no such columns.
+/// The problem and the estimate without the columns of payloads and offsets of single logs. The problem is `None` if it
+/// has no such columns.
 fn arm_alone(
     training: &Training,
     estimate: &Estimate,
@@ -326,8 +332,8 @@ fn arm_alone(
     Ok((alone, columns.arm_estimate(estimate)))
 }
 
-/// Fit of consistent sets to the torque with either sign (`None` if a fit fails), and the sign of each joint's
-/// friction.
+/// Residuals of physically consistent sets for both signs of the torque (`None` if a fit fails), and the sign of each
+/// joint's friction.
 fn torque_signs(
     training: &Training,
     estimate: &Estimate,
@@ -354,14 +360,14 @@ fn examine_all_training(
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
     let chosen: Vec<usize> = training.logs.iter().map(|log| log.index).collect();
-    // Torque of payloads and offsets of single logs would need further columns.
+    // With payloads or offsets of single logs, the torque would need further columns.
     let is_plain = training.columns.is_plain();
     let chosen = if is_plain { &chosen[..] } else { &[] };
     let position_torques = position_torques(logs, &training.model, chosen, &settings.examination)?;
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new(), position_torques })
 }
 
-/// Base parameters for a log: those of the estimate, and those of the consistent set if there is one.
+/// Base parameters for a log: those of the estimate, and those of the physically consistent set if there is one.
 fn values_of_log(
     training: &Training,
     estimate: &Estimate,
@@ -374,11 +380,11 @@ fn values_of_log(
     (columns.base_values(index, &estimate.values), physical)
 }
 
-/// Number of time blocks of the training logs; each is predicted by the fit to the others. With few blocks, they differ
-/// in temperature and motion as a new log does.
+/// Number of time blocks of the training logs, for factors on the error band: each block is predicted by the fit to the
+/// other blocks. With few blocks, temperature and motion differ between blocks as they do between logs.
 const VALIDATION_BLOCKS: usize = 4;
 
-/// Calls [`examine_held_out`] for every test recording, in parallel if possible.
+/// Calls [`examine_held_out`] for every held-out recording, in parallel if possible.
 fn examine_all_held_out(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,

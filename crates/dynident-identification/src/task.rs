@@ -9,18 +9,18 @@ use dynident_rows::Recording;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationTask {
-    /// The robot with the torque terms to estimate.
+    /// The robot model with the torque terms to estimate.
     pub robot: ParametricModel,
-    /// Recordings for the fit and for the tests.
+    /// Recordings for the fit and for the test.
     pub recordings: Vec<Recording>,
-    /// Payloads of the recordings.
+    /// Payloads in the recordings.
     pub payloads: Vec<Payload>,
     /// Filters, estimator, prior knowledge of the bodies.
     pub settings: IdentificationSettings,
 }
 
 impl IdentificationTask {
-    /// A task with default settings and without payload.
+    /// A task with default settings and without payloads.
     pub fn new(robot: ParametricModel, recordings: Vec<Recording>) -> Self {
         Self { robot, recordings, payloads: Vec::new(), settings: IdentificationSettings::default() }
     }

@@ -1,8 +1,8 @@
-//! Thresholds of decisions and tests.
+//! Thresholds for decisions and tests.
 
 use thiserror::Error;
 
-/// Default maximum lag, in seconds for an arm of usual size; drives and buses stay below.
+/// Default maximum lag, s, for an arm of usual size. The lags of drives and buses are shorter.
 pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 
 /// A key of `[thresholds]` is not finite or below its minimum. Write a larger number, or delete the key to use the
@@ -26,7 +26,7 @@ fn check(values: &[(&'static str, f64, f64)]) -> Result<(), ThresholdError> {
     }
 }
 
-/// Thresholds of the decisions before the last fit, and of the doubt about a study.
+/// Thresholds for the decisions before the last fit, and for treating a fit as doubtful.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct DecisionThresholds {
@@ -36,9 +36,9 @@ pub struct DecisionThresholds {
     pub cutoff: CutoffThresholds,
     /// Significance of friction terms.
     pub friction: FrictionThresholds,
-    /// Reasons to test alternative hypotheses.
+    /// When a fit is doubtful, so that hypotheses about mistakes in the study are tested.
     pub doubt: DoubtThresholds,
-    /// Bodies that differ from the robot description.
+    /// Which bodies differ from the robot description.
     pub description: DescriptionThresholds,
 }
 
@@ -47,14 +47,14 @@ pub struct DecisionThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DescriptionThresholds {
-    /// Probability of all explanations by one or two bodies from which the written model follows the most probable one:
-    /// bodies that did not change keep the values of the description, and a load is written in the body that carries
-    /// it. 0.7 by default: in simulations the probability is above 0.74 with one or two changed bodies, because noisy
-    /// logs do not exclude small differences of all bodies, and in five of six draws below 0.6 with differences of
-    /// every body.
+    /// Minimum probability of all explanations by one or two bodies together, for the exported model to follow the most
+    /// probable one: bodies that did not change then keep the values of the description, and a load is added to the
+    /// body that carries it. 0.7 by default. In simulations with one or two changed bodies the probability was above
+    /// 0.74; it is not close to 1, because noisy logs do not exclude small differences of all bodies. With differences
+    /// of every body, it was below 0.6 in five of six simulations.
     pub min_probability: f64,
-    /// Largest relative difference (standard deviation) that all bodies may have while one or two bodies explain the
-    /// rest. 0.03 by default: masses of good descriptions are accurate to a few percent.
+    /// Largest relative difference (standard deviation) that all bodies may have in an explanation by one or two
+    /// bodies. 0.03 by default: masses of good descriptions are accurate to a few percent.
     pub max_small_share: f64,
 }
 
@@ -68,11 +68,11 @@ impl Default for DescriptionThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DriveInertiaThresholds {
-    /// Minimum statistic of the test for drive inertia, in standard deviations of its distribution without drive
-    /// inertia; from this value on, drive inertia is added to the model. 3.0 by default: exceeded by chance once in 740
-    /// studies. An added inertia that is absent widens the other error bars; a missing one loses its torque. A stricter
-    /// limit would exclude a single drive whose deviation has three degrees of freedom: thirty of its standard
-    /// deviations are 3.7 normal ones.
+    /// Minimum test statistic with which drive inertia is added to the model, in standard deviations of its
+    /// distribution without drive inertia. 3.0 by default, which chance exceeds once in 740 studies. (Drive inertia
+    /// that is added wrongly only increases the other error bars; if it is omitted wrongly, its torque is missing.) A
+    /// higher threshold could exclude a robot with a single drive: with three degrees of freedom, an estimate of thirty
+    /// times its standard deviation corresponds to only 3.7 standard deviations of a normal distribution.
     pub min_std: f64,
 }
 
@@ -86,17 +86,17 @@ impl Default for DriveInertiaThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CutoffThresholds {
-    /// Ratio of the larger to the smaller of two cut-offs from which friction is selected again at the new cut-off. 1.2
-    /// by default; candidates are √2 apart.
+    /// Minimum ratio of the larger to the smaller of two cut-offs with which friction is selected again at the new
+    /// cut-off. 1.2 by default; neighbouring candidates have a ratio of √2.
     pub min_friction_ratio: f64,
-    /// Standard deviation of the velocity noise relative to the width of a friction step, above which the noise smears
-    /// the step. 0.05 by default; noise widens a smooth step by half the square of this ratio.
+    /// Ratio of the velocity noise (standard deviation) to the width of the smoothed friction sign above which the
+    /// noise blurs the sign. 0.05 by default; noise increases the width by half the square of this ratio.
     pub max_step_noise_ratio: f64,
-    /// Cut-off of the regressor relative to that of the instruments, used if the study states neither. 2.0 by default:
-    /// positions are hardly smoothed inside the instruments' band.
+    /// Ratio of the regressor's cut-off to the cut-off of the instruments, used if the study states neither. 2.0 by
+    /// default: with this ratio, the low-pass on the positions hardly affects the frequency band of the instruments.
     pub instruments_ratio: f64,
-    /// After `auto` selected instruments, a new cut-off replaces the old one only if it is at most this share of the
-    /// old one. 0.8 by default.
+    /// After `auto` selected instrumental variables, a new cut-off replaces the old one only if it is at most this
+    /// share of the old one. 0.8 by default.
     pub max_lowered_ratio: f64,
 }
 
@@ -110,20 +110,21 @@ impl Default for CutoffThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FrictionThresholds {
-    /// Critical values of Wald's test for a further friction term with 1, 2 and 3 degrees of freedom; a term with a
-    /// smaller statistic is not added. By default χ² at 5 %: stricter tests drop terms that improve the prediction
-    /// although they are not the true ones.
+    /// Critical values of Wald's test for an additional friction term with 1, 2 and 3 degrees of freedom. A term with a
+    /// smaller test statistic is not added. By default χ² at 5 %: stricter tests also drop terms that improve the
+    /// prediction, even if they are not physically correct.
     pub term_chi_square: [f64; 3],
-    /// The same for terms that only a second selection from the same motion adds. By default χ² at 1 %, because every
-    /// term is then tested twice.
+    /// Critical values of Wald's test with 1, 2 and 3 degrees of freedom for terms that only a second selection from
+    /// the same motion adds. By default χ² at 1 %, because every term is then tested twice.
     pub second_selection_chi_square: [f64; 3],
-    /// Minimum of `Σ e^{-2|q̇/v_s|^δ}` over the rows of a joint, the sum of squares of the column of a Stribeck term;
-    /// with less, the term is not tried. 1.0 by default, the value of one row at rest.
+    /// Minimum of `Σ e^{-2|q̇/v_s|^δ}` over the rows of a joint: the sum of squares of the column of a Stribeck term
+    /// with velocity v_s and exponent δ. With a smaller sum, the term is not tried. 1.0 by default, the value of one
+    /// row at rest.
     pub min_column_square_sum: f64,
-    /// Minimum gain of a law with memory or with load-dependent friction: the decrease of the joint's root mean square
-    /// error in cross-validation, as a share of the error with the best laws without memory and load. 0.02 by default:
-    /// smaller gains disappear in the differences between logs, and not every controller and simulator can hold these
-    /// laws.
+    /// Minimum improvement with which a law with hysteresis or load dependence is selected: the decrease of the joint's
+    /// root mean square error in cross-validation, relative to the error with the best laws without hysteresis and load
+    /// dependence. 0.02 by default: smaller improvements disappear in the differences between logs, and not every
+    /// controller and simulator supports these laws.
     pub min_gain_ratio: f64,
 }
 
@@ -138,18 +139,18 @@ impl Default for FrictionThresholds {
     }
 }
 
-/// Reasons to test alternative hypotheses about the logs.
+/// Thresholds above which a fit is doubtful, so that hypotheses about mistakes in the study are tested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DoubtThresholds {
-    /// Mean over joints of `ln(residual of a consistent robot / residual of separate joint parameters)` above which
-    /// alternative hypotheses are tested. 0.1 by default; simulated and well-described robots stay below 0.05.
+    /// Mean over joints of `ln(residual of a physically consistent robot / residual of separate joint parameters)`
+    /// above which a fit is doubtful. 0.1 by default; simulated and well-described robots stay below 0.05.
     pub max_log_residual_ratio: f64,
-    /// Number of rows per parameter of a joint below which alternative hypotheses are tested. 4/3 by default; with
-    /// fewer rows the separate fit follows the noise.
+    /// Number of rows per parameter of a joint below which a fit is doubtful. 4/3 by default; with fewer rows, the fit
+    /// with separate parameters follows the noise.
     pub min_rows_per_parameter: f64,
-    /// Residual of a held-out log relative to the noise of the fit, above which alternative hypotheses are tested. 1.7
-    /// by default; friction that changes with the motion causes less.
+    /// Residual of a held-out log relative to the noise of the fit above which a fit is doubtful. 1.7 by default;
+    /// friction that changes with the motion causes a smaller ratio.
     pub max_held_out_ratio: f64,
 }
 
@@ -187,7 +188,7 @@ impl DecisionThresholds {
     }
 }
 
-/// Thresholds of the estimation.
+/// Thresholds for the estimation.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct EstimationThresholds {
@@ -207,20 +208,21 @@ pub struct EstimationThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LagThresholds {
-    /// Smallest change of a parameter by a lag correction, in error bars of the parameter, for which the lag is
-    /// corrected. 0.3 by default.
+    /// Minimum change of a parameter by a lag correction with which the lag is corrected, in error bars of the
+    /// parameter. 0.3 by default.
     pub min_parameter_shift: f64,
-    /// χ² of the joint lags about their common lag, in standard deviations above its mean, above which one common lag
-    /// is rejected and joints may get separate lags. 4.0 by default.
+    /// Limit on the χ² of the joints' lags around their common lag, in standard deviations above its mean. Above it a
+    /// single common lag is rejected, and joints may get separate lags. 4.0 by default.
     pub max_scatter_std: f64,
-    /// Share of the squared residual of a joint that its separate lag has to explain; with less, the joint keeps the
+    /// Minimum share of a joint's squared residual that its separate lag must explain; otherwise the joint keeps the
     /// common lag. 0.5 by default; unmodelled friction looks like a lag but explains less.
     pub min_own_share: f64,
-    /// Prior standard deviation of a lag of a drive or a bus, in seconds for an arm of usual size
-    /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default: drives and buses are as fast as
-    /// their machine needs.
+    /// Prior standard deviation of the lag of a drive or a bus, s, for an arm of usual size
+    /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default; the speed of drives and buses
+    /// is assumed to scale with the size of the robot.
     pub prior_std_s: f64,
-    /// Maximum lag in the search, in seconds for an arm of usual size. 0.1 s by default; drives and buses stay below.
+    /// Maximum lag in the search, s, for an arm of usual size. 0.1 s by default; the lags of drives and buses are
+    /// shorter.
     pub max_lag_s: f64,
 }
 
@@ -236,26 +238,27 @@ impl Default for LagThresholds {
     }
 }
 
-/// Thresholds for noise in the regressor.
+/// Thresholds for the test whether noise in the regressor biases least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct NoiseThresholds {
-    /// Coefficient of the measured torque on the torque of the fast motion (1 if the robot really makes this motion, 0
-    /// for noise), below which the fast motion is mostly noise. 0.75 by default.
+    /// Regression coefficient of the measured torque on the torque of the fast motion, below which the fast motion is
+    /// mostly noise. (It is 1 if the robot really makes this motion, and 0 for noise.) 0.75 by default.
     pub max_followed: f64,
-    /// Root mean square over the parameters of the difference of two estimates, in error bars of the more accurate one,
-    /// up to which the estimates agree. 1.5 by default; two independent estimates with the same error bars differ by
-    /// 1.4.
+    /// Largest root mean square difference between two estimates (over the parameters, in error bars of the more
+    /// accurate estimate) with which the estimates agree. 1.5 by default; two independent estimates with equal error
+    /// bars differ by 1.4.
     pub max_contrast_rms: f64,
-    /// Largest difference of one parameter between two estimates, in error bars of the more accurate one, up to which
-    /// the estimates agree. 3.0 by default.
+    /// Largest difference of a single parameter between two estimates, in error bars of the more accurate estimate,
+    /// with which the estimates agree. 3.0 by default.
     pub max_contrast: f64,
-    /// Torque of the fast motion as a share of the whole torque, above which instruments with lower cut-offs are always
-    /// tried. 0.1 by default; the instruments of the first cut-off may then contain much noise themselves.
+    /// Share of the torque of the fast motion in the total torque above which instruments with lower cut-offs are
+    /// always tried. 0.1 by default; the instruments with the first cut-off may then also contain much noise.
     pub max_fast_torque_share: f64,
-    /// Smallest shift of the parameters by the noise, in error bars (root mean square over the parameters), for which
-    /// the noise matters; the shift is at most `√(Σ_j ‖V_j θ‖² / σ_j² / p)`. 0.3 by default, because large noise also
-    /// reduces θ and this bound.
+    /// Minimum shift of the parameters by noise with which the noise is significant, in error bars (root mean square
+    /// over the parameters). The shift is at most `√(Σ_j ‖V_j θ‖² / σ_j² / p)`: torque `V_j θ` of the noise at joint j,
+    /// standard deviation σ_j of the residual, and p parameters. 0.3 by default, because large noise also reduces θ and
+    /// therefore this bound.
     pub min_parameter_shift: f64,
 }
 
@@ -275,16 +278,16 @@ impl Default for NoiseThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LogVariationThresholds {
-    /// Minimum number of pairs (one parameter in two logs) for the variation of one kind of parameters; with fewer, the
-    /// variation is not estimated. 5 by default.
+    /// Minimum number of pairs (one parameter in two logs) for estimating the variation of one kind of parameters. 5 by
+    /// default.
     pub min_pairs: usize,
-    /// Minimum degrees of freedom of a parameter's variance in the fit of a single log; a pair with less is left out.
+    /// Minimum degrees of freedom of a parameter's variance in the fit to a single log; pairs with fewer are excluded.
     /// 4.5 by default.
     pub min_degrees_of_freedom: f64,
-    /// Largest `z²` of a pair relative to the typical one, where z is the difference of a parameter between two logs
-    /// over the standard deviation of this difference, and the typical `z²` follows from the median over all pairs of
-    /// bodies or of friction. Larger values are reduced to this limit. 25.0 by default, so that one wrong log does not
-    /// look like a variation of all logs.
+    /// Largest `z²` of a pair relative to the typical `z²`; larger values are reduced to this limit. Here z is the
+    /// difference of a parameter between two logs, divided by the standard deviation of this difference. The typical
+    /// `z²` follows from the median over all pairs for bodies or for friction. 25.0 by default, so that one wrong log
+    /// does not look like a variation of all logs.
     pub max_relative_square: f64,
 }
 
@@ -298,14 +301,14 @@ impl Default for LogVariationThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MotionThresholds {
-    /// Largest residual of the positions from their Fourier series, relative to the size of the motion; above it the
-    /// motion is not periodic, and the method is refused. 0.1 by default.
+    /// Largest residual of the positions from their Fourier series, relative to the size of the motion. Above it the
+    /// motion is not periodic, and the method is rejected. 0.1 by default.
     pub max_series_residual: f64,
-    /// Smallest size of the motion of a joint, rad (m); below it the joint is at rest. 1e-4 by default.
+    /// Minimum size of the motion of a joint, rad (m). Below it the joint is treated as resting. 1e-4 by default.
     pub min_motion: f64,
-    /// Maximum ratio of filtered residuals to those of weighted least squares for the spline fit. 1.25 by default.
-    /// Above it the correlated part of the torque residuals is model error, and the whitening filter has removed a part
-    /// of the motion as noise.
+    /// Maximum ratio of the filtered residuals of the spline fit to those of weighted least squares. 1.25 by default.
+    /// Above it the correlated part of the torque residuals is model error, and the fit has treated a part of the
+    /// motion as noise.
     pub max_spline_residual_ratio: f64,
 }
 
@@ -319,7 +322,7 @@ impl Default for MotionThresholds {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GainThresholds {
-    /// Largest half width of the 95 % interval of a gain, relative to the gain; above it the gain is reported as not
+    /// Largest half-width of the 95 % interval of a gain, relative to the gain. Above it the gain is reported as not
     /// identified. 0.5 by default.
     pub max_half_width: f64,
 }

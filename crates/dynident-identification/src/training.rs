@@ -1,4 +1,4 @@
-//! Triangular factors of the training recordings, and the model whose terms they contain.
+//! Triangular factors of the training recordings, and the model with their columns.
 
 use crate::consistent::nominal_covariance;
 use crate::error::IdentificationError;
@@ -26,37 +26,37 @@ use std::time::Instant;
 
 pub(crate) use crate::log_factors::LogFactors;
 
-/// Maximum number of passes for the load of load-dependent friction.
+/// Maximum number of passes for load-dependent friction.
 const MAX_LOAD_PASSES: usize = 6;
-/// Change of the rows between passes, relative to the torque, at which the load has converged.
+/// Change of the rows between two passes, relative to the torque, below which the load has converged.
 const MAX_RELATIVE_LOAD_CHANGE: f64 = 1e-3;
 
-/// Precision of held values, relative to the largest of them.
+/// Standard deviation with which fixed values are held, relative to the largest of them.
 const HELD_TOLERANCE: f64 = 1e-6;
 
-/// Factors of the training recordings, and the model of their columns.
+/// Triangular factors of the training recordings, and the model with their columns.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// The model with the selected friction.
+    /// The robot model with the selected friction.
     pub model: RegressorModel,
     /// Recordings, in the order of the problem's logs.
     pub logs: Vec<LogFactors>,
-    /// Joints of the problem: all of them, unless windows leave a joint without rows.
+    /// Joints of the problem: all joints, unless time windows leave a joint without rows.
     pub joints: Vec<usize>,
-    /// All rows over one set of columns.
+    /// All rows, with one common set of columns.
     pub problem: LinearProblem,
     /// Columns in addition to the base parameters: payloads and offsets of single logs.
     pub columns: LoadColumns,
-    /// Selection of friction by joint; empty if friction was stated.
+    /// Result of the selection of friction, by joint; empty if friction was stated.
     pub friction_choice: Vec<JointFriction>,
-    /// Estimate with unknown gains and the gains, if requested.
+    /// Estimate together with unknown torque gains, and the gains; `None` unless requested.
     pub gains: Option<(Estimate, Vec<DriveGain>)>,
-    /// Time for reading logs and for intermediate estimates, s.
+    /// Time for reading logs, and time for intermediate estimates, s.
     pub timings_s: [f64; 2],
 }
 
 impl Training {
-    /// Input of the estimators: the recordings `training` as factors and as logs.
+    /// Input of the estimators: the recordings `training`, as triangular factors and as logs.
     pub fn rows<'a>(
         &'a self,
         logs: &'a Logs<'a>,
@@ -68,9 +68,10 @@ impl Training {
     }
 }
 
-/// Computes the factors of the recordings `training`. Load-dependent friction needs several passes with the load of the
-/// previous fit. `known_arm` holds the arm and states which of its parameters are fitted again. Friction is that of the
-/// model; [`choose_friction`](crate::choose_friction) selects it before.
+/// Computes the triangular factors of the recordings `training`. Load-dependent friction needs several passes, each
+/// with the load of the previous fit. If `known_arm` is given, the arm's parameters are fixed, except those that it
+/// states to be fitted again. The friction terms are those of the model; call
+/// [`choose_friction`](crate::choose_friction) before to select them.
 ///
 /// # Errors
 /// Recordings cannot be read, payloads and gains contradict each other, or rows do not determine an estimate.
@@ -97,8 +98,8 @@ pub fn training_rows(
     Ok(fitted)
 }
 
-/// Weighted least squares (ordinary if the study requires it) with the stated terms on pieces of a motion; returns the
-/// values only.
+/// Fits the stated terms to pieces of a motion by weighted least squares (by ordinary least squares if the study
+/// requires it) and returns only the values.
 pub(crate) fn plain_fit(
     model: RegressorModel,
     pieces: Vec<MotionBlock>,
@@ -131,7 +132,7 @@ pub(crate) struct TrainingPasses<'a> {
 }
 
 impl<'a> TrainingPasses<'a> {
-    /// Passes over these training logs, without a known arm.
+    /// Prepares passes over these training logs, without a known arm.
     pub(crate) fn of_logs(
         logs: &'a Logs<'a>,
         settings: &'a IdentificationSettings,
@@ -141,8 +142,8 @@ impl<'a> TrainingPasses<'a> {
         Self { logs, settings, training, payloads, known_arm: None }
     }
 
-    /// Rows of this model. If friction depends on an unknown load, passes repeat with the load of the previous fit
-    /// until it converges.
+    /// Computes the rows of this model. If friction depends on an unknown load, the pass is repeated with the load of
+    /// the previous fit until the load converges.
     pub(crate) fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let load_is_known = model.load_parameters.is_some();
         let mut found = self.rows_once(model)?;
@@ -179,7 +180,7 @@ impl<'a> TrainingPasses<'a> {
         Ok(rows)
     }
 
-    /// Rows with the columns of this model.
+    /// Rows with the columns of this model, from one pass.
     pub(crate) fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
@@ -190,14 +191,14 @@ impl<'a> TrainingPasses<'a> {
         Ok(rows)
     }
 
-    /// Factors of the recordings, with the contribution of noise.
+    /// Triangular factors of the recordings, with the contribution of position noise.
     pub(crate) fn factors(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         let mut logs = self.read(model)?;
         self.add_noise(model, &mut logs)?;
         Ok(logs)
     }
 
-    /// Rows of factors that were computed elsewhere.
+    /// Rows from triangular factors that were computed elsewhere.
     pub(crate) fn of_factors(
         &self,
         model: RegressorModel,
@@ -228,7 +229,8 @@ impl<'a> TrainingPasses<'a> {
         Ok(LoadColumns::new(self.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
     }
 
-    /// Reads recordings in parallel, or a single one with a reader thread; results keep their order.
+    /// Reads the recordings in parallel, or a single recording with a second thread that reads the file. The results
+    /// keep the order of the recordings.
     pub(crate) fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
@@ -238,7 +240,7 @@ impl<'a> TrainingPasses<'a> {
         factors
     }
 
-    /// Adds the contribution of noise for these columns.
+    /// Adds the contribution of position noise for these columns.
     fn add_noise(&self, model: &RegressorModel, logs: &mut [LogFactors]) -> Result<(), LogError> {
         let one = |log: &mut LogFactors| {
             let LogStatistics { report, filtered_rows, .. } = &log.statistics;
@@ -259,7 +261,7 @@ impl<'a> TrainingPasses<'a> {
         logs: &[LogFactors],
     ) -> Result<LinearProblem, EstimationError> {
         let problem = self.stated_problem(model, columns, logs)?;
-        // With a known arm, no fallback parameter may absorb the payload.
+        // With a known arm, a parameter of the arm must not absorb the payload.
         if self.known_arm.is_some() || logs.iter().all(|log| log.noise.is_none()) {
             return Ok(problem);
         }
@@ -297,7 +299,7 @@ impl<'a> TrainingPasses<'a> {
         let mut problem = LinearProblem::new(columns.symbols(model), names);
         let keep_known = self.settings.gains == GainChoice::Unknown && model.torque_gains.is_empty();
         for log in logs {
-            // Two recordings can share a name, so the index is part of the name.
+            // Two recordings can have the same name, so the index is part of the name.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
             let Some(factors) = factors(log) else { continue };
             for (place, &joint) in joints.iter().enumerate() {
@@ -310,7 +312,8 @@ impl<'a> TrainingPasses<'a> {
         Ok(problem)
     }
 
-    /// Columns that contain only noise and other columns, judged with the noise of a first fit in each joint.
+    /// Columns that contain only noise or combinations of other columns, compared with the noise of each joint in a
+    /// first fit.
     fn unexcited(
         &self,
         model: &RegressorModel,
@@ -319,7 +322,7 @@ impl<'a> TrainingPasses<'a> {
     ) -> Result<Unexcited, EstimationError> {
         let weights = match weighted_values(problem, &self.settings.estimation.weighted()) {
             Ok(first) => first.joint_sigma.iter().map(|sigma| sigma.recip()).collect(),
-            // The estimate itself reports the error.
+            // If this fit fails, the estimate itself will report the error.
             Err(_) => vec![1.0; problem.joints().len()],
         };
         let robot = &model.parametric;
@@ -334,7 +337,7 @@ impl<'a> TrainingPasses<'a> {
     }
 }
 
-/// Whether the load in `next` hardly changes the rows compared with the current load.
+/// Whether the load in `next` changes the rows only little compared with the current load.
 fn has_load_converged(found: &Training, next: &RegressorModel) -> bool {
     let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return false };
     let (mut change, mut torque) = (0.0, 0.0);
@@ -354,12 +357,12 @@ fn has_load_converged(found: &Training, next: &RegressorModel) -> bool {
     change <= MAX_RELATIVE_LOAD_CHANGE * MAX_RELATIVE_LOAD_CHANGE * torque
 }
 
-/// Joints with rows in some recording; windows can leave a joint without rows.
+/// Joints that have rows in some recording; time windows can leave a joint without rows.
 fn joints_with_rows(logs: &[LogFactors], dof: usize) -> Vec<usize> {
     (0..dof).filter(|&joint| logs.iter().any(|log| log.factors[joint].rows() > 0)).collect()
 }
 
-/// Holds columns at given values by a prior that is far narrower than any data.
+/// Fixes columns at given values, by a prior that is far narrower than any data.
 fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, EstimationError> {
     if held.is_empty() {
         return Ok(problem);
@@ -376,7 +379,7 @@ fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, 
     problem.with_prior(mean, information)
 }
 
-/// Values and joint noise used to select friction and to compute loads.
+/// Parameter values and joint noise, for the selection of friction and for loads.
 pub(crate) fn plain_values(
     settings: &EstimationSettings,
     problem: &LinearProblem,
@@ -389,7 +392,7 @@ pub(crate) fn plain_values(
     Ok(WeightedValues { values, joint_sigma, white_std, iterations, converged: true })
 }
 
-/// The estimate with these values.
+/// The complete estimate with these values.
 pub(crate) fn plain_estimate(
     settings: &EstimationSettings,
     problem: &LinearProblem,

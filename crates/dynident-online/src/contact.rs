@@ -8,18 +8,21 @@ use serde::{Deserialize, Serialize};
 pub struct ContactSettings {
     /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// Time constant of the mean of the residual that detects collisions, s.
+    /// Time constant of the short exponential mean of the residual, which detects collisions, s.
     pub collision_s: f64,
-    /// Time constant of the mean of the residual that detects persistent loads (a payload or a hand), s.
+    /// Time constant of the long exponential mean of the residual, which detects persistent forces (a payload or a
+    /// hand), s.
     pub payload_s: f64,
     /// Allowed false alarms per hour, for all joints and both time scales together.
     pub false_alarms_per_hour: f64,
-    /// Minimum duration of the calibration, in payload time constants; shorter ones give inaccurate thresholds.
+    /// Minimum duration of the calibration, divided by [`payload_s`](Self::payload_s). Shorter calibrations give
+    /// inaccurate thresholds.
     pub min_calibration_ratio: f64,
 }
 
 impl ContactSettings {
-    /// Time constants of 20 ms and 2 s, one false alarm in twenty hours, calibration of at least ten time constants.
+    /// Default settings: time constant of 20 ms for collisions and 2 s for payloads, one false alarm in twenty hours,
+    /// and a calibration of at least ten times the longer time constant.
     pub fn new(rate_hz: f64) -> Self {
         Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05, min_calibration_ratio: 10.0 }
     }
@@ -41,27 +44,27 @@ impl ContactSettings {
 /// Nm (N).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residuals {
-    /// Residuals by joint.
+    /// Residuals of each joint.
     pub joints: Vec<Vec<f64>>,
 }
 
-/// Time scale at which a contact was detected.
+/// Which of the two means of the residual exceeded its threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TimeScale {
-    /// Short time constant.
+    /// The mean with the short time constant.
     Collision,
-    /// Long time constant.
+    /// The mean with the long time constant.
     Payload,
 }
 
-/// A residual beyond its threshold.
+/// A detected contact: a mean residual beyond its threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// The joint.
     pub joint: usize,
-    /// Time scale of the detection.
+    /// Which mean of the residual exceeded its threshold.
     pub look: TimeScale,
-    /// Mean residual over the time constant, minus its level on undisturbed motion, Nm (N).
+    /// Mean residual of the joint, minus its level during undisturbed motion, Nm (N).
     pub residual_nm: f64,
     /// Threshold for the allowed false-alarm rate, Nm (N).
     pub threshold_nm: f64,
@@ -69,21 +72,22 @@ pub struct Contact {
 
 /// Detects contact from residuals.
 ///
-/// Each joint's residual is filtered by two exponential means. On undisturbed motion each mean has a standard deviation
-/// σ and crosses its level upwards ν₀ times per second. A Gaussian process crosses a height h upwards `ν₀ exp(−h²/2σ²)`
-/// times per second (Rice, Bell System Technical Journal 24 (1945) 46, 3.3), so that the threshold is
+/// Each joint's residual is filtered by two exponential means, a short and a long one. During undisturbed motion, each
+/// mean has a standard deviation σ and crosses its level (its mean value) upwards ν₀ times per second. A Gaussian
+/// process exceeds the level by a height h with the rate `ν₀ exp(−h²/2σ²)` per second (Rice, Bell System Technical
+/// Journal 24 (1945) 46, 3.3). The threshold h is therefore
 ///
 /// ```text
 ///     h = k σ √(2 ln(2 · 3600 ν₀ / f)),
 /// ```
 ///
-/// with f the allowed false alarms per hour of this mean, for both signs together. Residuals have heavier tails than
-/// Gaussian noise, so k ≥ 1 is the ratio of the largest observed mean to the one that Rice predicts for the observed
-/// time.
+/// where f is the number of allowed false alarms per hour of this mean, for both signs together. Residuals have heavier
+/// tails than Gaussian noise. The factor k ≥ 1 accounts for this: it is the ratio of the largest observed mean to the
+/// largest mean that Rice's formula predicts for the duration of the calibration.
 #[derive(Clone, Debug)]
 pub struct ContactMonitor {
     settings: ContactSettings,
-    /// Level and threshold of each joint, by time scale.
+    /// Level and threshold of each joint, for the short and the long mean.
     levels: Vec<[f64; 2]>,
     thresholds: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
@@ -98,7 +102,8 @@ pub struct ContactState {
 }
 
 impl ContactMonitor {
-    /// A monitor calibrated with residuals of an undisturbed motion, preferably of the motion that will be monitored.
+    /// Creates a monitor and calibrates it with residuals of an undisturbed motion, preferably of the motion that will
+    /// be monitored.
     ///
     /// # Errors
     /// Invalid settings; residuals that are too short, not finite, or zero.
@@ -106,7 +111,7 @@ impl ContactMonitor {
         settings.validate()?;
         let least = (settings.min_calibration_ratio * settings.payload_s * settings.rate_hz).ceil();
         let joints = calibration.joints.len();
-        // The allowed false alarms are divided among two time scales of each joint.
+        // The allowed false alarms are divided among the two means of all joints.
         let each = settings.false_alarms_per_hour / (2.0 * joints.max(1) as f64);
         let (mut levels, mut thresholds) = (Vec::new(), Vec::new());
         for residuals in &calibration.joints {
@@ -132,17 +137,20 @@ impl ContactMonitor {
         Ok(Self { means: levels.clone(), settings, levels, thresholds })
     }
 
-    /// A monitor with thresholds from the accuracy of the model: `std_nm` is the standard deviation of each joint's
-    /// residual (half width of its 95 % band divided by 1.96), `correlation_s` the correlation time of the residual,
-    /// and `band_hz` the cut-off of the filter behind which it was measured, if any.
+    /// Creates a monitor whose thresholds follow from the accuracy of the model, without a calibration: `std_nm` is the
+    /// standard deviation of each joint's residual (half width of its 95 % band divided by 1.96), `correlation_s` the
+    /// correlation time of the residual, and `band_hz` the cut-off of the low-pass after which this deviation was
+    /// measured, if any.
     ///
-    /// Noise with the correlation `exp(−t/τ)`, filtered by a mean of time constant T, has the variance `σ² τ/(τ + T)`
-    /// and crosses its level upwards `ν₀ = 1/(2π √(τ T))` times per second (Rice, as above, for a spectrum with two
-    /// poles). Model errors change with the motion, so τ is the time scale of the motion (about one second), not that
-    /// of the sensor noise; a larger τ gives higher thresholds. A filter of cut-off B removes noise that remains in a
-    /// mean with T below `1/(4 B)`. If all of σ² was white, it would be `σ² min(1/(4 T), rate/2)/B` in the mean, whose
-    /// samples cross their level `rate acos(e^(−1/(T rate)))/2π` times per second. The higher threshold is used. If
-    /// undisturbed motion can be recorded, thresholds from [`new`](Self::new) are more accurate.
+    /// Two kinds of residuals are considered, and the higher threshold is used. First, model errors: noise with
+    /// standard deviation σ and the correlation `exp(−t/τ)`, filtered by an exponential mean of time constant T, has
+    /// the variance `σ² τ/(τ + T)`. It crosses its level upwards `ν₀ = 1/(2π √(τ T))` times per second (Rice, as cited
+    /// at [`ContactMonitor`], for a spectrum with two poles). Model errors change with the motion, so τ is the time
+    /// scale of the motion (about one second), not that of the sensor noise; a larger τ gives higher thresholds.
+    /// Second, white sensor noise: σ was measured after a low-pass of cut-off B, which removes noise that a mean with T
+    /// below `1/(4 B)` still contains. If all of σ² were white noise, the mean would have the variance
+    /// `σ² min(1/(4 T), rate/2)/B` and cross its level `rate acos(e^(−1/(T rate)))/2π` times per second. If undisturbed
+    /// motion can be recorded, the thresholds of [`new`](Self::new) are more accurate.
     ///
     /// # Errors
     /// Invalid settings; deviations, a time or a cut-off that are not positive.
@@ -178,13 +186,13 @@ impl ContactMonitor {
         Ok(Self { means: levels.clone(), thresholds: std_nm.iter().map(of).collect(), settings, levels })
     }
 
-    /// Thresholds of each joint for collision and payload, Nm (N).
+    /// Thresholds of each joint for the short mean (collision) and the long mean (payload), Nm (N).
     pub fn thresholds_nm(&self) -> &[[f64; 2]] {
         &self.thresholds
     }
 
-    /// Processes the residuals of a sample, one per joint; returns the contact with the largest ratio to its threshold,
-    /// if any. Does not allocate.
+    /// Processes the residuals of a sample, one per joint; returns the contact whose mean residual exceeds its
+    /// threshold by the largest factor, if there is one. Does not allocate.
     ///
     /// # Errors
     /// A different number of residuals, or a value that is not finite; the state is then unchanged.
@@ -226,7 +234,7 @@ impl ContactMonitor {
         Ok(())
     }
 
-    /// Resets the means: the next sample starts a new motion.
+    /// Resets the exponential means before a new motion.
     pub fn restart(&mut self) {
         self.means.clone_from(&self.levels);
     }
@@ -241,7 +249,7 @@ fn mean_gain(constant_s: f64, rate_hz: f64) -> f64 {
 struct MeanStatistics {
     level: f64,
     std: f64,
-    /// Number of upward crossings of the level, and largest distance from it.
+    /// Number of upward crossings of the level, and the largest distance from the level.
     crossings: usize,
     largest: f64,
 }
@@ -277,7 +285,8 @@ impl MeanStatistics {
     }
 }
 
-/// Height, in standard deviations, that a Gaussian process exceeds once per this number of level crossings.
+/// Height, in standard deviations, that a Gaussian process exceeds once during this number of upward crossings of its
+/// mean.
 fn rice_height(crossings: f64) -> f64 {
     (2.0 * crossings.max(core::f64::consts::E).ln()).sqrt()
 }

@@ -5,10 +5,10 @@ use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 
 /// Local polynomials through the latest samples: position, velocity and acceleration in the middle of a window,
-/// together with the torques measured there.
+/// together with the torques that were measured at that time.
 ///
-/// The window contains `2 m + 1` samples, so the result has a delay of `m` samples but no phase error. For positions
-/// `q_i` at the times `i T`, i from −m to m, the least-squares cubic has at i = 0
+/// The window contains `2 m + 1` samples, so the result is delayed by `m` samples but has no phase error. For positions
+/// `q_i` at the times `i T` with sampling period T and i from −m to m, the least-squares cubic polynomial has at i = 0
 ///
 /// ```text
 ///     q̂ = Σ (3 m² + 3 m − 1 − 5 i²) q_i · 3 / ((2m−1)(2m+1)(2m+3)),
@@ -17,22 +17,23 @@ use serde::{Deserialize, Serialize};
 ///
 ///  (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627; here by discrete orthogonal polynomials up to degree 3).
 ///
-/// With time stamps ([`add_at`](Self::add_at)) the cubic is fitted at the stamps, so that lost samples cause no error.
-/// A window that is longer than [`MAX_WINDOW_RATIO`](Self::MAX_WINDOW_RATIO) of its usual length gives no result.
+/// With time stamps ([`add_at`](Self::add_at)), the cubic is fitted at the times of the stamps, so that lost samples
+/// cause no error. A window that is longer than [`MAX_WINDOW_RATIO`](Self::MAX_WINDOW_RATIO) of its usual length gives
+/// no result.
 #[derive(Clone, Debug)]
 pub struct DelayedDerivatives {
     joints: usize,
     half: usize,
     rate_hz: f64,
-    /// Weights of position, velocity and acceleration over the window, oldest first.
+    /// Weights of the samples in the window for position, velocity and acceleration, oldest sample first.
     weights: [Vec<f64>; 3],
     /// Ring buffer of positions and torques: sample `s` starts at `(s % window) * 2 * joints`.
     ring: Vec<f64>,
-    /// Time of each sample in the ring, in periods.
+    /// Time of each sample in the ring buffer, in sampling periods.
     times: Vec<f64>,
     seen: usize,
     now: DelayedSample,
-    /// Weights for uneven samples.
+    /// Weights for samples that are not evenly spaced.
     uneven: [Vec<f64>; 3],
 }
 
@@ -53,19 +54,20 @@ pub struct DelayedSample {
     pub dq: Vec<f64>,
     /// Accelerations, rad/s² (m/s²).
     pub ddq: Vec<f64>,
-    /// Measured torques at that time, Nm (N).
+    /// Torques measured at that time, Nm (N).
     pub tau: Vec<f64>,
 }
 
 impl DelayedDerivatives {
-    /// Longest window that gives a result, divided by the usual length. The error of the cubic grows with the fourth
-    /// power of the length.
+    /// Longest duration of a window that gives a result, divided by the duration without lost samples. The error of the
+    /// cubic grows with the fourth power of the duration.
     pub const MAX_WINDOW_RATIO: f64 = 1.5;
-    /// Largest distance of a step from a whole number of periods that is treated as jitter of the stamps.
+    /// Largest deviation of the time between two samples from a whole number of periods that is treated as jitter of
+    /// the stamps, in periods.
     const JITTER_PERIODS: f64 = 0.25;
 
-    /// Derivatives for a number of joints, sampled at `rate_hz`, over windows of `2 half + 1` samples; `half` is at
-    /// least 2.
+    /// Computes derivatives for a number of joints, sampled at `rate_hz`, over windows of `2 half + 1` samples; `half`
+    /// is at least 2.
     ///
     /// # Errors
     /// [`OnlineError::Number`] for a rate that is not positive, or an invalid window.
@@ -94,8 +96,8 @@ impl DelayedDerivatives {
         self.half
     }
 
-    /// Adds the latest positions and torques; returns the sample in the middle of the window once it is full. The
-    /// sample follows the previous one by one period.
+    /// Adds the latest positions and torques; returns the sample in the middle of the window once it is full. The time
+    /// since the previous sample is assumed to be one period.
     ///
     /// # Errors
     /// A vector of a different length, or a value that is not finite; the state is then unchanged.
@@ -103,8 +105,9 @@ impl DelayedDerivatives {
         self.add_after(1.0, q, tau)
     }
 
-    /// As [`add`](Self::add), for a sample that was measured `step_s` after the previous one, s. A step close to a
-    /// whole number of periods is rounded to it. Returns `None` while a longer pause is in the window.
+    /// As [`add`](Self::add), for a sample that was measured `step_s` seconds after the previous one. The time is
+    /// rounded to a whole number of periods if it is close to one. Returns `None` while the window contains a longer
+    /// pause.
     ///
     /// # Errors
     /// As [`add`](Self::add), and a step that is not positive.
@@ -133,7 +136,7 @@ impl DelayedDerivatives {
         if length > Self::MAX_WINDOW_RATIO * usual {
             return Ok(None);
         }
-        // Also uneven steps may have this length.
+        // A window of uneven steps can have the same total length.
         let is_even = (1..window).all(|back| time(back) - time(back - 1) == 1.0);
         if !is_even {
             let middle = time(self.half);
@@ -166,7 +169,7 @@ impl DelayedDerivatives {
         DerivativesState { ring: self.ring.clone(), times: self.times.clone(), seen: self.seen }
     }
 
-    /// Continues from a stored state.
+    /// Continues from a stored state of the same joints and window.
     ///
     /// # Errors
     /// A state of other joints or of another window.
@@ -199,8 +202,9 @@ fn weights(half: usize, rate_hz: f64) -> [Vec<f64>; 3] {
     ]
 }
 
-/// Weights of the least-squares cubic at the places in `weights[0]`, divided by `half`, in place: value, slope and
-/// curvature at zero. Returns false if the places do not determine a cubic.
+/// Computes weights of the least-squares cubic for value, slope and curvature at time zero, and stores them in
+/// `weights`. On entry, `weights[0]` contains the times of the samples, divided by `half`. Returns false if the times
+/// do not determine a cubic.
 fn uneven_weights(weights: &mut [Vec<f64>; 3], half: usize, rate_hz: f64) -> bool {
     let mut sums = [0.0; 7];
     for place in &weights[0] {

@@ -1,4 +1,4 @@
-//! Detection of drift of the robot's parameters.
+//! Detection of drift: a slow change of the robot's parameters.
 
 use crate::error::{OnlineError, check, check_positive};
 use crate::estimator::{OnlineEstimator, StartingPoint};
@@ -9,18 +9,19 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 /// Settings of drift detection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriftSettings {
-    /// Time between checks, s; at least four half-lives of the estimator, so that checks are independent.
+    /// Time between drift checks, s; at least four half-lives of the estimator's forgetting, so that checks are
+    /// independent.
     pub check_s: f64,
     /// Allowed false alarms per hour.
     pub false_alarms_per_hour: f64,
-    /// Minimum number of checks that determine mean and variance of the statistic; at least 2, default 8.
+    /// Minimum number of checks that are used to learn mean and variance of the test statistic; at least 2, default 8.
     pub min_learned_checks: usize,
-    /// Confidence of the upper limit of the statistic's variance, between 0 and 1, default 0.95.
+    /// Confidence of the upper limit on the test statistic's variance, between 0 and 1, default 0.95.
     pub variance_confidence: f64,
 }
 
 impl DriftSettings {
-    /// One false alarm in ten hours.
+    /// Default settings: one false alarm in ten hours.
     pub fn new(check_s: f64) -> Self {
         Self { check_s, false_alarms_per_hour: 0.1, min_learned_checks: 8, variance_confidence: 0.95 }
     }
@@ -53,36 +54,38 @@ impl DriftSettings {
         }
     }
 
-    /// Allowed share of checks with a false alarm.
+    /// Allowed probability of a false alarm in one check.
     fn level(&self) -> f64 {
         self.false_alarms_per_hour * self.check_s / 3600.0
     }
 }
 
-/// Result of a check.
+/// Result of one drift check.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriftAlarm {
-    /// Distance between estimate and reference in the metric of both covariances, divided by its mean without drift.
+    /// Test statistic: squared distance between estimate and reference, weighted by both covariances and divided by its
+    /// mean without drift.
     pub statistic: f64,
     /// Threshold for the allowed false-alarm rate.
     pub threshold: f64,
-    /// The base parameter that alone explains the largest part of the distance.
+    /// Index of the base parameter that alone explains the largest part of the distance.
     pub parameter: usize,
 }
 
-/// Compares an estimate with forgetting with a reference.
+/// Detects drift by comparing a recursive estimate, which forgets old samples, with a reference estimate.
 ///
-/// With R and r the triangle of an [`OnlineEstimator`] with forgetting, and θ₀ the reference with its covariance V₀, `d
-/// = r − R θ₀` has the covariance `C = I + R V₀ Rᵀ` if the reference is correct and the errors are as in the
-/// estimator's settings. The statistic is `T = dᵀ C⁻¹ d`. If the samples determine all parameters, T is the distance
-/// between both estimates in the metric of the sum of their covariances; undetermined directions contribute nothing.
+/// The recursive estimate of an [`OnlineEstimator`] solves `R θ = r` with a triangular matrix R; θ₀ is the reference
+/// with covariance V₀. If the reference is correct and the torque errors are as in the estimator's settings,
+/// `d = r − R θ₀` has the covariance `C = I + R V₀ Rᵀ`. The test statistic is `T = dᵀ C⁻¹ d`. If the samples determine
+/// all parameters, T is the squared distance between both estimates, weighted by the inverse of the sum of their
+/// covariances. Parameter combinations that the samples do not determine contribute nothing.
 ///
-/// Errors are neither white nor of the assumed size, so the distribution of T is learned from n checks without drift,
-/// with mean m and variance v. As a sum of squares of correlated Gaussian variables, T is approximately `m χ²_ν / ν`
-/// with `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check follows `F(ν, n
-/// ν)`. ν is the lower limit at 95 % confidence from the scatter of n checks. The threshold is the quantile of that F
-/// that is exceeded with probability `f Δ`, with f the allowed false-alarm rate and Δ the time between checks. Errors
-/// depend on speed and load: learn with the motion that will be monitored.
+/// Real errors are neither white nor of the assumed size. Therefore mean m and variance v of T are learned from n
+/// checks without drift. As a sum of squares of correlated Gaussian variables, T is approximately `m χ²_ν / ν` with
+/// `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check follows `F(ν, n ν)`.
+/// For ν, the lower limit at 95 % confidence from the n checks is used. The threshold is the value that this F
+/// distribution exceeds with probability `f Δ`, where f is the allowed false-alarm rate and Δ the time between checks.
+/// Errors depend on speed and load, so the learning motion must be the motion that will be monitored.
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     settings: DriftSettings,
@@ -91,7 +94,7 @@ pub struct DriftMonitor {
 }
 
 impl DriftMonitor {
-    /// A monitor for a reference, without learned checks.
+    /// Creates a monitor for a reference estimate; no checks are learned yet.
     ///
     /// # Errors
     /// Invalid settings; a reference with values that are not finite, or a covariance of a different size.
@@ -103,7 +106,7 @@ impl DriftMonitor {
         Ok(Self { settings, reference, learned: Vec::new() })
     }
 
-    /// The statistics of the learned checks, for storage.
+    /// The test statistics of all learned checks, for storage.
     pub fn statistics(&self) -> &[f64] {
         &self.learned
     }
@@ -123,13 +126,13 @@ impl DriftMonitor {
         self.learned.len()
     }
 
-    /// Whether enough checks were learned; before that, [`check`](Self::check) returns `None`.
+    /// Whether enough checks were learned. Before that, [`check`](Self::check) returns `None`.
     pub fn is_ready(&self) -> bool {
         self.learned.len() >= self.settings.min_learned_checks
     }
 
-    /// Learns the statistic while the reference is correct. Call it at the same interval as [`check`](Self::check)
-    /// later, at least eight times, preferably thirty times. Allocates.
+    /// Learns the test statistic of one check. Call it while the robot still agrees with the reference, at the same
+    /// interval as [`check`](Self::check) later: at least eight times, preferably thirty times. Allocates memory.
     ///
     /// # Errors
     /// An estimator of a different robot, or one without samples.
@@ -140,7 +143,7 @@ impl DriftMonitor {
         Ok(())
     }
 
-    /// Threshold of `T/m`; `None` before enough checks were learned.
+    /// Threshold of `T/m` (test statistic divided by its learned mean); `None` before enough checks were learned.
     pub fn threshold(&self) -> Option<f64> {
         if !self.is_ready() {
             return None;
@@ -156,9 +159,8 @@ impl DriftMonitor {
         Some(tail.inverse_cdf(1.0 - self.settings.level()))
     }
 
-    /// Distance between estimate and reference; `None` before enough checks were learned. See
-    /// [`DriftAlarm::is_raised`]. Needs 2 n³ operations for n parameters and allocates: do not call it in the control
-    /// loop.
+    /// Checks for drift; `None` before enough checks were learned. [`DriftAlarm::is_raised`] states whether there is an
+    /// alarm. Needs 2 n³ operations for n parameters and allocates memory: do not call it in the control loop.
     ///
     /// # Errors
     /// As [`learn`](Self::learn).
@@ -169,7 +171,7 @@ impl DriftMonitor {
         Ok(Some(DriftAlarm { statistic: distance / mean, threshold, parameter }))
     }
 
-    /// T, and the parameter that alone explains the largest part of it.
+    /// Test statistic T, and the index of the parameter that alone explains the largest part of it.
     fn distance(&self, estimator: &OnlineEstimator) -> Result<(f64, usize), OnlineError> {
         let factor = estimator.information();
         let columns = self.reference.values.len();
@@ -203,7 +205,7 @@ impl DriftMonitor {
 }
 
 impl DriftAlarm {
-    /// Whether the statistic is above its threshold.
+    /// Whether there is an alarm: the statistic is above its threshold.
     pub fn is_raised(&self) -> bool {
         self.statistic > self.threshold
     }

@@ -4,7 +4,7 @@ use dynident_estimation::EstimationError;
 use dynident_identification::consistent::ConsistencyError;
 use thiserror::Error;
 
-/// Why a sample or a setting is invalid. An invalid sample changes nothing.
+/// Reason why a sample or a setting is invalid. An invalid sample does not change the state of the monitor.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe the fields")]
@@ -26,7 +26,7 @@ pub enum OnlineError {
     /// No consistent parameters were found.
     #[error("{0}")]
     Consistency(#[from] ConsistencyError),
-    /// Rows that the factor rejects.
+    /// The triangular factor rejects the rows of a sample.
     #[error("{0}")]
     Rows(#[from] EstimationError),
 }

@@ -1,4 +1,4 @@
-//! Recursive estimate that equals the batch estimate after every sample.
+//! Recursive estimate that equals the estimate from all samples at once, after every sample.
 
 use crate::error::{OnlineError, check, check_positive};
 use dynident_dynamics::{Panels, TermHistory, Workspace, regressor_panels_of_sample};
@@ -10,23 +10,24 @@ use dynident_model::terms::{HysteresisState, JointMotion};
 use nalgebra::{Cholesky, DMatrix};
 use serde::{Deserialize, Serialize};
 
-/// Weight above which all rows are rescaled, to prevent an overflow of its square.
+/// Weight of new rows above which all rows are rescaled. Otherwise the square of the weight could overflow.
 const MAX_GROWTH: f64 = 1e30;
 
-/// Settings of the estimator: weights of samples.
+/// Settings of the recursive estimator: weights of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnlineSettings {
-    /// Standard deviation of each joint's torque error, Nm (N); rows are divided by it.
+    /// Standard deviation of each joint's torque error, Nm (N); the rows of the joint are divided by it.
     pub torque_std_nm: Vec<f64>,
-    /// Number of samples after which the weight of a sample has halved; `None` disables forgetting.
+    /// Number of samples after which the weight of a sample is halved; `None` keeps all samples with equal weight.
     pub half_life_samples: Option<f64>,
-    /// Number of samples with the information of one independent sample; above 1 for residuals that are correlated in
-    /// time.
+    /// Number of successive samples that contain as much information as one independent sample; above 1 if residuals
+    /// are correlated in time.
     pub samples_per_independent: f64,
 }
 
 impl OnlineSettings {
-    /// Independent errors with these standard deviations, without forgetting.
+    /// Settings for errors with these standard deviations that are independent from sample to sample, without
+    /// forgetting.
     pub fn new(torque_std_nm: Vec<f64>) -> Self {
         Self { torque_std_nm, half_life_samples: None, samples_per_independent: 1.0 }
     }
@@ -50,7 +51,7 @@ impl OnlineSettings {
     }
 }
 
-/// Estimate before the first sample.
+/// Estimate of the parameters before the first sample.
 #[derive(Clone, Debug)]
 pub struct StartingPoint {
     /// Base parameters.
@@ -61,16 +62,18 @@ pub struct StartingPoint {
 
 /// Recursive estimate of base parameters in square-root form.
 ///
-/// Every sample adds one row `w_j/σ_j`, `τ_j/σ_j` per joint to the triangle of all previous rows (a
-/// [`RecursiveFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so the covariance stays positive
-/// definite for any number of samples. Without forgetting the result is the batch estimate, up to rounding. Bierman,
-/// Factorization Methods for Discrete Sequential Estimation (1977), ch. IV.
+/// For each joint j, every sample adds one row `w_j/σ_j`, `τ_j/σ_j` (regressor row and torque, divided by the standard
+/// deviation of the torque error) to the triangular factor `[R r]` of all previous rows (a [`RecursiveFactor`]). The
+/// estimate solves `R θ = r`. No rows are subtracted, so the covariance stays positive definite for any number of
+/// samples. Without forgetting, the result equals the least-squares estimate from all samples at once, up to rounding.
+/// Bierman, Factorization Methods for Discrete Sequential Estimation (1977), ch. IV.
 #[derive(Debug)]
 pub struct OnlineEstimator {
     model: RegressorModel,
     settings: OnlineSettings,
     factor: RecursiveFactor,
-    /// Factor of new rows: forgetting increases the weight of new rows instead of reducing that of old ones.
+    /// Weight of new rows. To forget old samples, the weight of new rows is increased instead of reducing that of old
+    /// rows.
     growth: f64,
     growth_per_sample: f64,
     samples: u64,
@@ -82,7 +85,7 @@ pub struct OnlineEstimator {
 /// State of an [`OnlineEstimator`], for storage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EstimatorState {
-    /// Entries of the factor, and its samples.
+    /// Entries of the triangular factor, and the number of its samples.
     factor: Vec<f64>,
     factor_samples: usize,
     growth: f64,
@@ -91,8 +94,8 @@ pub struct EstimatorState {
 }
 
 impl OnlineEstimator {
-    /// An estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one extended by an
-    /// identification), from an initial estimate. Without `start`, [`values`](Self::values) returns false until the
+    /// Creates an estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one extended by
+    /// an identification), from an initial estimate. Without `start`, [`values`](Self::values) returns false until the
     /// samples determine the parameters.
     ///
     /// # Errors
@@ -117,7 +120,7 @@ impl OnlineEstimator {
         let begins: Vec<usize> = (0..dof).map(first).collect();
         let mut factor = RecursiveFactor::new(columns, &begins);
         if let Some(start) = start {
-            // The weight of the start is independent of the samples per independent one.
+            // The weight of the initial estimate does not depend on `samples_per_independent`.
             let rows = TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?;
             factor.start_from(&rows.scaled(settings.samples_per_independent.sqrt())?)?;
         }
@@ -133,7 +136,7 @@ impl OnlineEstimator {
             settings,
             model,
         };
-        // Buffers that grow with the first sample are allocated before it.
+        // Some buffers are allocated at the first sample; this artificial sample allocates them in advance.
         let rest = vec![0.0; dof];
         made.update_regressor(&rest, &rest, &rest);
         made.restart();
@@ -150,8 +153,8 @@ impl OnlineEstimator {
         self.samples
     }
 
-    /// Triangle of all rows including the start. With forgetting it is scaled by an increasing factor, which
-    /// [`information`](Self::information) removes.
+    /// Triangular factor of all rows, including the initial estimate. With forgetting, it is scaled by a factor that
+    /// grows with every sample; [`information`](Self::information) removes this factor.
     pub fn factor(&self) -> &RecursiveFactor {
         &self.factor
     }
@@ -196,13 +199,13 @@ impl OnlineEstimator {
         Ok(())
     }
 
-    /// The next sample starts a new motion: friction with memory is reset.
+    /// Starts a new motion with the next sample: friction with hysteresis is reset.
     pub fn restart(&mut self) {
         self.history.restart();
     }
 
-    /// Torque of the last sample for the base parameters `values`, in `out`, in the unit of the drive's log, Nm (N).
-    /// Does not allocate.
+    /// Computes the torque that the base parameters `values` predict for the last sample, and writes it to `out`, in
+    /// the scale of the logged torque (before estimated gains are applied), Nm (N). Does not allocate memory.
     ///
     /// # Panics
     /// If the length of `values` is not the number of base parameters, or that of `out` not the number of joints.
@@ -219,7 +222,8 @@ impl OnlineEstimator {
         self.model.torque_gains.get(joint).copied().unwrap_or(1.0)
     }
 
-    /// Adds a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Does not allocate.
+    /// Adds a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Does not allocate
+    /// memory.
     ///
     /// # Errors
     /// A vector of a different length or a value that is not finite; the state is then unchanged.
@@ -257,8 +261,9 @@ impl OnlineEstimator {
         self.factor.solve(out)
     }
 
-    /// Covariance of the base parameters, `κ (RᵀR)⁻¹` with κ the samples per independent one; `None` while the samples
-    /// do not determine them. Allocates.
+    /// Covariance of the base parameters, `κ (RᵀR)⁻¹` with the triangular factor R and κ =
+    /// [`samples_per_independent`](OnlineSettings::samples_per_independent). `None` while the samples do not determine
+    /// the parameters. Allocates memory.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let triangle = self.information().regressor_triangle();
         let columns = triangle.ncols();
@@ -267,16 +272,18 @@ impl OnlineEstimator {
         covariance.iter().all(|value| value.is_finite()).then_some(covariance)
     }
 
-    /// `R/√κ` without the factor of forgetting: `(RᵀR)⁻¹` is the covariance. Allocates.
+    /// Triangular factor R of the information matrix: `(RᵀR)⁻¹` is the covariance of the base parameters. Allocates
+    /// memory.
     pub fn information(&self) -> TriangularFactor {
         let scale = self.growth_per_sample / self.growth / self.settings.samples_per_independent.sqrt();
-        // Both are positive and finite, because growth is bounded.
+        // Numerator and denominator are positive and finite, because the growth of the weight is bounded.
         self.factor.to_triangular().scaled(scale).unwrap_or_else(|_| self.factor.to_triangular())
     }
 
-    /// The physically consistent parameters of all bodies and terms that fit the samples best, as
-    /// [`consistent_parameters`] computes them from the factors of logs; the rows of all joints are treated as those of
-    /// one, in units of their noise. Needs milliseconds and allocates: do not call it in the control loop.
+    /// Computes the physically consistent parameters of all bodies and terms that fit the samples best, as
+    /// [`consistent_parameters`] does for the triangular factors of logs. The rows of all joints are treated as rows of
+    /// one joint, because each is divided by its noise. Needs milliseconds and allocates memory: do not call it in the
+    /// control loop.
     ///
     /// # Errors
     /// As [`consistent_parameters`].
@@ -294,14 +301,15 @@ impl OnlineEstimator {
     }
 }
 
-/// Rows of the initial estimate: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
+/// Rows that represent the initial estimate θ₀ with covariance V: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
 fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, OnlineError> {
     check("values of the start", &start.values, columns)?;
     if start.covariance.shape() != (columns, columns) {
         let found = start.covariance.nrows();
         return Err(OnlineError::Length { what: "covariance of the start", expected: columns, found });
     }
-    // Fixed parameters have no variance; they get a standard deviation of a thousandth of the smallest other one.
+    // Fixed parameters have no variance; they get a thousandth of the smallest standard deviation of the other
+    // parameters.
     let mut covariance = start.covariance.clone();
     let least = covariance.diagonal().iter().copied().filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
     for held in 0..columns {
@@ -319,8 +327,9 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
     Ok(root.iter().chain(right.iter()).copied().collect())
 }
 
-/// `V^(-1/2)` of a rank-deficient covariance, such as from fewer segments than parameters. Small eigenvalues of the
-/// correlation matrix are raised to 1e-4 of the largest, so that unknown directions are not treated as exactly known.
+/// `V^(-1/2)` of a rank-deficient covariance V, for example from fewer time segments than parameters. Small eigenvalues
+/// of the correlation matrix are raised to 1e-4 of the largest one. Otherwise parameter combinations that are unknown
+/// would be treated as exactly known.
 fn inverse_square_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
     const MIN_EIGENVALUE_RATIO: f64 = 1e-4;
     let std = covariance.diagonal().map(f64::sqrt);
@@ -330,7 +339,7 @@ fn inverse_square_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, Online
     let correlation = DMatrix::from_fn(std.len(), std.len(), |i, j| covariance[(i, j)] / (std[i] * std[j]));
     let eigen = correlation.symmetric_eigen();
     let largest = eigen.eigenvalues.max();
-    // A negative eigenvalue is accepted only within rounding.
+    // Negative eigenvalues are accepted only within rounding errors.
     if eigen.eigenvalues.min() < -1e-9 * largest {
         return Err(OnlineError::Covariance);
     }

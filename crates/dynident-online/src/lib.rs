@@ -5,12 +5,12 @@
 //! | --- | --- |
 //! | complete monitoring with an identified model | [`Watch`] |
 //! | velocities and accelerations from a stream of positions | [`DelayedDerivatives`] |
-//! | recursive estimate, equal to the batch estimate | [`OnlineEstimator`] |
+//! | recursive estimate, equal to the estimate from all samples at once | [`OnlineEstimator`] |
 //! | detection of collisions, payloads, and a hand on the arm | [`ContactMonitor`] |
 //! | detection of drift | [`DriftMonitor`] |
 //! | current physically consistent parameters | [`OnlineEstimator::consistent`] |
 //!
-//! All types are for one robot, a [`ParametricModel`](dynident_dynamics::ParametricModel), and one sampling rate.
+//! Each object is for one robot, a [`ParametricModel`](dynident_dynamics::ParametricModel), and one sampling rate.
 
 #![forbid(unsafe_code)]
 

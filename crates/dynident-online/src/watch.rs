@@ -11,26 +11,28 @@ use serde::{Deserialize, Serialize};
 /// Settings of the monitoring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchSettings {
-    /// Contact detection, and sampling rate.
+    /// Settings of contact detection, including the sampling rate.
     pub contact: ContactSettings,
-    /// Half-life of samples in the estimate, s; `None` disables forgetting and drift detection, and starts from the
-    /// reference.
+    /// Half-life of samples in the recursive estimate, s. `None` disables forgetting and drift detection; the estimate
+    /// then starts from the reference.
     pub half_life_s: Option<f64>,
     /// Correlation time of the residuals, s; see [`ContactMonitor::from_band`].
     pub correlation_s: f64,
-    /// Cut-off of the filter behind which the residuals' deviations were measured, Hz; `None` without a filter.
+    /// Cut-off of the low-pass after which the standard deviations of the residuals were measured, Hz; `None` without a
+    /// low-pass.
     pub band_hz: Option<f64>,
-    /// Number of samples on each side of the derivative window; see [`DelayedDerivatives`].
+    /// Number of samples before and after the middle of the derivative window; see [`DelayedDerivatives`].
     pub half_window: usize,
     /// Allowed false drift alarms per hour.
     pub drift_alarms_per_hour: f64,
-    /// Time between drift checks, in half-lives of the estimator; checks are nearly independent at the default of 4.
+    /// Time between drift checks, in half-lives of the recursive estimate. With the default of 4, successive checks are
+    /// nearly independent.
     pub drift_check_half_lives: f64,
 }
 
 impl WatchSettings {
-    /// Half-life of 15 s with a drift check every minute, correlation time of 1 s, windows of 21 samples, one false
-    /// contact alarm in twenty hours and one false drift alarm in ten hours.
+    /// Default settings: half-life of 15 s with a drift check every minute, correlation time of 1 s, derivative windows
+    /// of 21 samples, one false contact alarm in twenty hours and one false drift alarm in ten hours.
     pub fn new(rate_hz: f64) -> Self {
         Self {
             contact: ContactSettings::new(rate_hz),
@@ -99,9 +101,9 @@ pub struct WatchState {
 }
 
 impl Watch {
-    /// Monitoring with a model: `reference` is the estimate of its base parameters with covariance, `std_nm` the
-    /// standard deviation of each joint's residual. Contact thresholds are those of [`ContactMonitor::from_band`] until
-    /// [`calibrate`](Self::calibrate).
+    /// Creates a monitor for a robot model: `reference` is an estimate of the base parameters with covariance, `std_nm`
+    /// the standard deviation of each joint's residual. The contact thresholds are those of
+    /// [`ContactMonitor::from_band`] until [`calibrate`](Self::calibrate) is called.
     ///
     /// # Errors
     /// Invalid settings, or a reference that does not match the robot.
@@ -118,13 +120,14 @@ impl Watch {
         check_positive("drift_check_half_lives", &[settings.drift_check_half_lives])?;
         let online = OnlineSettings {
             half_life_samples: settings.half_life_s.map(|half| half * rate_hz),
-            // For noise with a correlation of e^(-t/τ), or white noise up to the filter's cut-off.
+            // The larger number of the two: for noise with the correlation e^(-t/τ), and for white noise up to the
+            // filter's cut-off.
             samples_per_independent: (2.0 * settings.correlation_s * rate_hz)
                 .max(settings.band_hz.map_or(1.0, |band_hz| 0.5 * rate_hz / band_hz))
                 .max(1.0),
             ..OnlineSettings::new(std_nm.to_vec())
         };
-        // An estimate with forgetting is compared with the reference, so it must be independent of it.
+        // An estimate with forgetting is compared with the reference, so it must not start from the reference.
         let start = settings.half_life_s.is_none().then_some(&reference);
         let estimator = OnlineEstimator::new(model, online, start)?;
         let columns = estimator.factor().columns();
@@ -144,7 +147,7 @@ impl Watch {
             derivatives: DelayedDerivatives::new(std_nm.len(), rate_hz, settings.half_window)?,
             residuals: vec![0.0; std_nm.len()],
             drift: check_s.map(drift).transpose()?,
-            // The first check would still depend on the start.
+            // An earlier first check would still depend on the initial estimate.
             next_check: samples_to_check.saturating_mul(2),
             contact_settings: settings.contact.clone(),
             reference: values,
@@ -154,8 +157,8 @@ impl Watch {
         })
     }
 
-    /// Adds a sample with its derivatives; returns the contact with the largest ratio to its threshold, if any. Does
-    /// not allocate.
+    /// Adds a sample with its derivatives; returns the contact that exceeds its threshold by the largest factor, if
+    /// there is one. Does not allocate memory.
     ///
     /// # Errors
     /// As [`OnlineEstimator::add`]; the state is then unchanged.
@@ -164,8 +167,8 @@ impl Watch {
         add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
-    /// Adds measured positions and torques. Velocities and accelerations come from [`DelayedDerivatives`], so the
-    /// result applies to the middle of their window. Does not allocate.
+    /// Adds measured positions and torques. Velocities and accelerations are computed by [`DelayedDerivatives`], so the
+    /// result applies to the middle of their window. Does not allocate memory.
     ///
     /// # Errors
     /// As [`add`](Self::add).
@@ -175,9 +178,9 @@ impl Watch {
         add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
-    /// As [`add_measured`](Self::add_measured), for a sample that was measured `step_s` after the previous one by the
-    /// robot's clock, s, so that lost samples are not a contact. After a long pause there is no result until its
-    /// samples have left the window, and friction with memory is reset.
+    /// As [`add_measured`](Self::add_measured), for a sample that was measured `step_s` seconds after the previous one
+    /// on the robot's clock. Lost samples then do not cause contact alarms. After a long pause there is no result until
+    /// the window contains only samples after the pause, and friction with hysteresis is reset.
     ///
     /// # Errors
     /// As [`add`](Self::add), and a step that is not positive.
@@ -192,7 +195,7 @@ impl Watch {
         add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
-    /// The state, for storage: [`restore`](Self::restore) continues from it with the same results, bit by bit.
+    /// The state, for storage. After [`restore`](Self::restore), all results are identical, bit by bit.
     pub fn state(&self) -> WatchState {
         WatchState {
             estimator: self.estimator.state(),
@@ -204,7 +207,7 @@ impl Watch {
         }
     }
 
-    /// Continues from a stored state of a watch with the same model and settings.
+    /// Continues from a stored state of a [`Watch`] with the same model and settings.
     ///
     /// # Errors
     /// A state of another model or other settings.
@@ -226,9 +229,9 @@ impl Watch {
         self.drift.is_some() && self.estimator.samples() >= self.next_check
     }
 
-    /// Learns the drift statistic in the first eight checks, assuming a correct reference, and compares with it later.
-    /// `None` while learning, and if no check is due. Needs a fraction of a millisecond for 64 parameters and
-    /// allocates: do not call it in the control loop.
+    /// Checks for drift. The first eight checks learn the statistic without drift, under the assumption that the
+    /// reference is correct. Returns `None` during these checks, and if no check is due. Needs a fraction of a
+    /// millisecond for 64 parameters and allocates memory: do not call it in the control loop.
     ///
     /// # Errors
     /// As [`DriftMonitor::check`].
@@ -258,24 +261,24 @@ impl Watch {
         Ok(())
     }
 
-    /// The next sample starts a new motion.
+    /// Starts a new motion with the next sample.
     pub fn restart(&mut self) {
         self.derivatives.restart();
         self.estimator.restart();
         self.contact.restart();
     }
 
-    /// Residual of the last sample: torque minus prediction by the reference, Nm (N).
+    /// Residual of the last sample: measured torque minus the torque that the reference predicts, Nm (N).
     pub fn residuals_nm(&self) -> &[f64] {
         &self.residuals
     }
 
-    /// The estimate.
+    /// The recursive estimator.
     pub fn estimator(&self) -> &OnlineEstimator {
         &self.estimator
     }
 
-    /// The monitor of contact.
+    /// The contact monitor.
     pub fn contact(&self) -> &ContactMonitor {
         &self.contact
     }

@@ -1,4 +1,4 @@
-//! The samples of a log with commanded positions, as recorded: no filter, no resampling, no derivative.
+//! Samples of a log with commanded positions, as recorded: without filter, interpolation or derivatives.
 
 use crate::error::{FormatError, RecordingError};
 use crate::log::{Log, LogReader, RawBlock};
@@ -24,14 +24,14 @@ pub struct CommandedMotion {
     pub name: String,
     /// Names of the joints, n.
     pub joints: Vec<String>,
-    /// Time of each sample, s after the first data row of the file. A step of more than one period where rows were left
-    /// out.
+    /// Time of each sample, s after the first data row of the file. Where rows were omitted, the step is longer than
+    /// one period.
     pub times_s: Vec<f64>,
     /// Measured positions (rad, m): sample i of joint j is entry `i * n + j`.
     pub positions: Vec<f64>,
     /// Commanded positions (rad, m), in the same order.
     pub commands: Vec<f64>,
-    /// 0-based data row in the file of each sample.
+    /// Data row in the file of each sample, from 0.
     pub rows: Vec<u64>,
 }
 
@@ -50,7 +50,7 @@ impl CommandedMotion {
     /// Encoder resolution of each joint (rad, m), estimated from the measured positions; `None` if they are not
     /// quantised, or change fewer than 20 times.
     ///
-    /// The estimate is the step of which 90 % of the differences between successive positions are multiples.
+    /// The estimate is the step size of which 90 % of the differences between successive positions are multiples.
     pub fn encoder_counts(&self) -> Vec<Option<f64>> {
         (0..self.joints.len())
             .map(|joint| quantisation_step(&self.joint(&self.positions, joint).collect::<Vec<_>>()))

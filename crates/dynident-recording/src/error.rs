@@ -1,4 +1,4 @@
-//! Errors between a log file and a motion. Each message names the file, the place and the fix.
+//! Errors in reading a log and converting it to a motion. Each message contains the file, the place and the fix.
 
 use crate::place::LogPlace;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ impl FormatError {
     }
 }
 
-/// A log that cannot be read or turned into a motion.
+/// Reason why a log cannot be read or converted to a motion.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
@@ -301,7 +301,7 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
-    /// The file and the 1-based line of the error, as far as they are known. Samples in memory have no file.
+    /// File and line number (from 1) of the error, if they are known. Samples in memory have no file.
     pub fn place(&self) -> (Option<PathBuf>, Option<u64>) {
         let of_place = |place: &LogPlace| match place {
             LogPlace::Line { log, line } => (Some(PathBuf::from(log)), Some(*line)),
@@ -334,7 +334,7 @@ impl RecordingError {
     }
 }
 
-/// The file of a log; `None` if its label is a name of samples in memory.
+/// File of a log; `None` if its label is a name for samples in memory.
 fn of_label(label: &str) -> Option<PathBuf> {
     Some(PathBuf::from(label)).filter(|path| path.exists())
 }
@@ -346,7 +346,7 @@ fn no_rows(place: &LogPlace) -> String {
     }
 }
 
-/// A filter that cannot be built or applied.
+/// Reason why a filter or differentiator cannot be created or applied.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {
@@ -418,7 +418,7 @@ pub enum FilterError {
     },
 }
 
-/// Returns [`FilterError::Setting`] unless `holds`.
+/// Returns [`FilterError::Setting`] unless the condition `holds` is true.
 pub(crate) fn require(holds: bool, name: &'static str, value: f64, fix: &'static str) -> Result<(), FilterError> {
     if holds { Ok(()) } else { Err(FilterError::Setting { name, value, fix }) }
 }

@@ -1,5 +1,5 @@
-//! **From a log to a motion**: sources of rows, column mapping, units, clock and gaps, filters, differentiators, and
-//! the parallel filter that decimates regressor and torque. All values are SI.
+//! **From a log to a motion**: sources of rows, mapping of columns, units, clock and gaps, filters, differentiators,
+//! and the parallel filter that decimates regressor and torque. All values are in SI units.
 //!
 //! # Tour
 //!
@@ -14,7 +14,7 @@
 //! | differentiators that use the commanded motion | [`Reference`], [`MotionStream::following`] |
 //! | gaps, dead channels, lags and other findings | [`MotionStream::report`], [`report`] |
 //! | a cut-off from the data | [`cutoff()`] |
-//! | regressor and torque filtered and decimated alike | [`Decimator`] |
+//! | the same filter and decimation for regressor and torque | [`Decimator`] |
 //!
 //! Data flow: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s → outliers
 //! and held samples marked ([`RejectedSamples`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →

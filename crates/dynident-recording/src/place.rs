@@ -18,7 +18,7 @@ pub enum LogPlace {
         /// 1-based line number.
         line: u64,
     },
-    /// A row of numbers without a line.
+    /// A row of numbers without a line number.
     Row {
         /// Label of the log.
         log: String,

@@ -1,6 +1,6 @@
-//! Estimates the quantisation step of a channel.
+//! Estimation of the quantisation step of a channel.
 
-/// The step of which 90 % of the differences between successive values are multiples (within 2 %).
+/// The step size of which 90 % of the differences between successive values are multiples (within 2 %).
 pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =
         values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
@@ -8,11 +8,12 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
         return None;
     }
     steps.sort_unstable_by(f64::total_cmp);
-    // Not the minimum, because rounding of printed text causes much smaller differences.
+    // The minimum is not used, because rounding of printed text causes much smaller differences.
     let least = 0.02 * steps[steps.len() / 20];
     let mut candidate = *steps.iter().find(|step| **step >= least)?;
-    // Printed text rounds the smallest differences by about 1 %, so that errors of a hundred steps add up to a whole
-    // one. Larger differences determine the step better, once it is accurate enough to count steps in them.
+    // Printed text rounds the smallest differences by about 1 %, so over a hundred steps the errors add up to a whole
+    // step. Larger differences determine the step better, but only after it is accurate enough to count the steps in
+    // them.
     for most in [8.0, 64.0, 512.0, 4096.0] {
         let counted = steps.iter().map(|step| (step, (step / candidate).round()));
         let counted = counted.filter(|(_, count)| (1.0..=most).contains(count));
@@ -26,8 +27,8 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     (multiples.count() as f64 >= 0.9 * steps.len() as f64).then_some(candidate)
 }
 
-/// Median change of a signal in which at least 10 % of the samples repeat: the step of a signal that is quantised and
-/// slow, or at rest, also below the printed resolution. `None` for other signals.
+/// Median change of a signal in which at least 10 % of the samples repeat. This is the step of a quantised signal that
+/// is slow or at rest, also if the step is below the printed resolution. `None` for other signals.
 pub(crate) fn usual_change(values: &[f64]) -> Option<f64> {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let mut changes: Vec<f64> = changes.filter(|change| *change > 0.0).collect();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of `check --json`.
 pub const CHECK_SCHEMA: &str = "dynident/check/1";
 
-/// Share of a torque that is most of it, percent.
+/// Share of unexplained torque above which most of a joint's torque is unexplained, percent.
 const MOST_PERCENT: f64 = 50.0;
 
 /// Result of `check`.
@@ -31,20 +31,22 @@ pub struct StudyCheck {
     pub findings: Vec<CheckFinding>,
     /// Names of the joints, in the order of the hypothesis results.
     pub joints: Vec<String>,
-    /// The study as written; null if the hypotheses could not be compared.
+    /// Score of the study as it is written; null if the hypotheses could not be compared.
     pub as_written: Option<HypothesisResult>,
-    /// The hypothesis that explains the logs clearly better, if there is one.
+    /// Score of the hypothesis (a possible mistake in the study) that explains the logs clearly better; null if there
+    /// is none.
     pub best: Option<HypothesisResult>,
-    /// Number of tested hypotheses.
+    /// Number of tested hypotheses about mistakes in the study.
     pub tried: usize,
-    /// Torque of all joints without explanation by the best hypothesis, percent (root mean squares); null if the
-    /// hypotheses could not be compared, and in results of older versions.
+    /// Unexplained torque of the best hypothesis, all joints together, percent of the measured torque (root mean
+    /// squares); null if the hypotheses could not be compared, and in results of older versions.
     #[serde(default)]
     pub unexplained_percent: Option<f64>,
-    /// Share of each joint's torque that noise explains, percent; empty in results of older versions.
+    /// Share of each joint's torque that measurement noise explains, percent; empty in results of older versions.
     #[serde(default)]
     pub noise_percent: Vec<f64>,
-    /// The same for all joints together; null in results of older versions.
+    /// Share of the torque of all joints together that measurement noise explains, percent; null in results of older
+    /// versions.
     #[serde(default)]
     pub noise_of_all_percent: Option<f64>,
     /// Number of logs without torque whose commands were compared with the positions; 0 in results of older versions.
@@ -52,7 +54,7 @@ pub struct StudyCheck {
     pub commanded_logs: usize,
 }
 
-/// One thing that was found.
+/// One finding of `check`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CheckFinding {
@@ -67,9 +69,9 @@ pub struct CheckFinding {
     pub evidence: String,
     /// Corrections of the study; empty if no key corrects the mistake.
     pub write: Vec<StudyChange>,
-    /// Alternative explanations that these logs do not distinguish.
+    /// Other explanations that the logs cannot distinguish from this finding.
     pub or: Vec<String>,
-    /// Code, which `dynident docs` explains; empty in results of older versions.
+    /// Code of the finding; `dynident docs CODE` explains it. Empty in results of older versions.
     #[serde(default)]
     pub code: String,
 }
@@ -88,9 +90,10 @@ pub struct StudyChange {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HypothesisResult {
-    /// Torque of each joint without explanation by a physically consistent robot, percent (root mean squares).
+    /// Unexplained torque of each joint in the best physically consistent fit, percent of its measured torque (root
+    /// mean squares).
     pub left_percent: Vec<f64>,
-    /// Joints that exceed their limits.
+    /// Names of the joints whose positions, velocities or torques exceed their limits.
     pub beyond_limits: Vec<String>,
     /// Score from all evidence, lower is better; a difference of 0.6 is clear.
     pub score: f64,
@@ -121,7 +124,7 @@ impl From<KeyChange> for StudyChange {
 }
 
 impl StudyChange {
-    /// The table in brackets.
+    /// The table of the key in brackets, as in a study file.
     pub fn place(&self) -> String {
         if self.table.starts_with('[') { self.table.clone() } else { format!("[{}]", self.table) }
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`ComparisonFile`].
 pub const COMPARISON_SCHEMA: &str = "dynident/comparison/1";
 
-/// Results of one type of robot side by side, and what changed between them.
+/// Results of one type of robot side by side, with the changes between them.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ComparisonFile {
@@ -22,7 +22,7 @@ pub struct ComparisonFile {
     pub bodies: Vec<ComparedBody>,
     /// Friction law of each joint.
     pub friction: Vec<ComparedFriction>,
-    /// Changes of each later result from the first one; for a single result, its changes from the robot description.
+    /// Changes of each later result from the first one. For a single result: its changes from the robot description.
     pub changes: Vec<ChangesFrom>,
     /// Limits of the comparison.
     pub notes: Vec<String>,
@@ -46,18 +46,18 @@ pub struct ComparedResult {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ComparedParameter {
-    /// Symbol.
+    /// Symbol of the regressor column.
     pub symbol: String,
-    /// Expression.
+    /// Expression of the base parameter as a sum of inertial and friction parameters.
     pub expression: String,
     /// Unit at a revolute joint.
     pub unit: String,
-    /// Estimates.
+    /// Estimate of each result.
     pub values: Vec<f64>,
-    /// Half-widths of their 95 % intervals.
+    /// Half-width of the 95 % interval of each estimate.
     pub half_widths_95: Vec<f64>,
-    /// Largest difference from the first result, divided by the standard deviation of the difference; 0 for a single
-    /// result.
+    /// Largest difference of an estimate from that of the first result, divided by the standard deviation of the
+    /// difference; 0 for a single result.
     pub largest_z: f64,
 }
 
@@ -67,9 +67,10 @@ pub struct ComparedParameter {
 pub struct ComparedBody {
     /// Name of its main link.
     pub name: String,
-    /// Mass, kg.
+    /// Mass in each result, kg.
     pub mass_kg: Vec<f64>,
-    /// Half-width of the 95 % interval with 30 % uncertainty of the robot description, kg; null if not known.
+    /// Half-width of the 95 % interval of each mass, kg; assumes 30 % uncertainty of the masses in the robot
+    /// description. Null if not known.
     pub half_width_95_kg: Vec<Option<f64>>,
 }
 
@@ -91,11 +92,12 @@ pub struct ChangesFrom {
     pub result: usize,
     /// Index of the result that it is compared with; null for the robot description.
     pub from: Option<usize>,
-    /// `dᵀ C⁻¹ d` of all compared parameters: difference `d`, covariance `C` of both results.
+    /// Test statistic `dᵀ C⁻¹ d` of all compared parameters: `d` is the difference of the two results, `C` the sum of
+    /// their covariances.
     pub chi_squared: f64,
     /// Number of compared parameters.
     pub degrees_of_freedom: usize,
-    /// Probability of a larger value if nothing changed.
+    /// Probability of a larger test statistic if nothing changed.
     pub p_value: f64,
     /// Explanations, the most probable first; those below 1 % are omitted.
     pub explanations: Vec<ChangeExplanation>,
@@ -105,15 +107,15 @@ pub struct ChangesFrom {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ChangeExplanation {
-    /// The parts; empty if nothing changed.
+    /// The parts that changed; empty if nothing changed.
     pub parts: Vec<ChangedPart>,
-    /// Whether every part changed; `parts` is then empty.
+    /// Whether every part of the robot changed; `parts` is then empty.
     #[serde(default)]
     pub everything: bool,
-    /// Probability among the compared explanations.
+    /// Probability of this explanation among the compared explanations.
     pub probability: f64,
-    /// `dᵀ C⁻¹ d` that remains after this change, divided by the number of parameters; about 1 for a complete
-    /// explanation.
+    /// Test statistic `dᵀ C⁻¹ d` after this change is taken into account, divided by the number of parameters; about 1
+    /// if the explanation is complete.
     pub remaining: f64,
 }
 
@@ -123,10 +125,11 @@ pub struct ChangeExplanation {
 pub struct DescriptionComparison {
     /// Explanations, the most probable first; those below 1 % are omitted.
     pub explanations: Vec<ChangeExplanation>,
-    /// Every body: probability that it differs, and the torque error after it gets the values of the description again.
+    /// For every body, the probability that it differs from the description, and the torque error if the body gets the
+    /// values of the description again.
     pub bodies: Vec<RestoredBody>,
-    /// Whether the written model follows the first explanation: the bodies that it does not name keep the values of the
-    /// description.
+    /// Whether the exported model follows the most probable explanation. In that case, bodies that the explanation does
+    /// not name keep the values of the description.
     pub is_followed: bool,
 }
 
@@ -134,9 +137,9 @@ pub struct DescriptionComparison {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ChangedPart {
-    /// The body or joint, in words.
+    /// Name of the body or joint in a sentence.
     pub part: String,
-    /// Change of a body: of its mass, kg.
+    /// Change of the body's mass, kg; null for a joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_kg: Option<f64>,
     /// Half-width of the 95 % interval of `mass_kg`, kg.

@@ -22,13 +22,13 @@ pub struct DesignFile {
     pub provenance: Option<Provenance>,
     /// Joints in the order of all vectors.
     pub joints: Vec<String>,
-    /// The family; `given` for a trajectory or log that was checked.
+    /// Family of trajectories; `given` for a trajectory or log that was checked.
     pub family: String,
     /// The checked trajectory or log; null for a search.
     pub given: Option<String>,
     /// Settings of the family, in the format of a study; null for a given motion.
     pub family_settings: Option<FamilyChoice>,
-    /// Parameters of the family; the resulting motion is then shifted to `start_posture`.
+    /// Parameters of the family. They describe the motion before it is shifted to `start_posture`.
     pub parameters: Vec<f64>,
     /// Fixed start position of each joint, rad (m): null for a free joint, empty if all are free.
     pub start_posture: Vec<Option<f64>>,
@@ -38,44 +38,46 @@ pub struct DesignFile {
     pub criterion: String,
     /// Value of the criterion, lower is better; null if a parameter is not excited.
     pub criterion_figure: Option<f64>,
-    /// Condition number of the stacked base regressor, SI units, no weights.
+    /// Condition number of the base regressor, rows of all samples and joints stacked, in SI units without weights.
     pub condition_number: Option<f64>,
-    /// The same after division of each column by its norm.
+    /// Condition number of the same stacked regressor after each column is divided by its norm.
     pub condition_number_scaled: Option<f64>,
-    /// `log det WᵀW` of the stacked base regressor, for a torque noise of 1 Nm (N).
+    /// `log det WᵀW` of the stacked base regressor W, for a torque noise of 1 Nm (N).
     pub log_det: Option<f64>,
-    /// `log det D` with the torque noise of the study.
+    /// Logarithm of the determinant of the information matrix, `log det D`, with the torque noise of the study.
     pub log_det_weighted: Option<f64>,
     /// Number of base parameters, including friction and drives.
     pub base_columns: usize,
     /// Duration, s.
     pub duration_s: f64,
-    /// Sample rate assumed for the figures, Hz.
+    /// Sample rate that the predictions assume, Hz.
     pub rate_hz: f64,
-    /// Standard deviation of each joint's torque, Nm (N).
+    /// Standard deviation of each joint's torque noise, Nm (N).
     pub torque_std_nm: Vec<f64>,
     /// Whether all limits are satisfied in the independent check.
     pub feasible: bool,
     /// Sample rate of the check, Hz.
     pub check_rate_hz: f64,
-    /// Checked data: the motion itself, or the interpolation of a given one.
+    /// What was checked: the motion itself, or an interpolation of the given samples.
     pub check_of: String,
-    /// Every limit with its utilisation by the motion.
+    /// Every limit, with the largest value of the motion relative to it.
     pub limits: Vec<LimitReport>,
-    /// Predicted error bars for this motion or log, for white torque noise.
+    /// Predicted error bars of the base parameters for this motion or log. The torque noise is assumed white.
     pub forecast: Vec<ParameterForecast>,
-    /// The least known combinations of parameters, including the prior.
+    /// Combinations of parameters with the largest predicted error, including prior knowledge.
     pub worst_directions: Vec<DirectionForecast>,
-    /// Strokes of a windowed design, with condition numbers and the optimum.
+    /// Result of a windowed design: one stroke per joint, the condition number in each stroke's window, and the best
+    /// possible strokes. Null for other designs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windowed: Option<WindowedFile>,
-    /// Evaluations of criterion, limits and gradient.
+    /// Number of evaluations of criterion, limits and gradient together.
     pub evaluations: usize,
     /// Processor time of all threads, s; null if the operating system does not report it.
     pub cpu_s: Option<f64>,
     /// Elapsed time, s.
     pub seconds: f64,
-    /// Whether the search or its check was stopped early. A complete search with the same seed may find another motion.
+    /// Whether the search or the check of its result was stopped early. A complete search with the same seed may find
+    /// another motion.
     #[serde(default)]
     pub stopped: bool,
     /// Seed of the random starts.
@@ -85,7 +87,7 @@ pub struct DesignFile {
     /// Assumed limits that neither study nor robot description state, with the key that changes each.
     #[serde(default)]
     pub assumed: Vec<String>,
-    /// Aspects without a limit, which `feasible` does not cover.
+    /// Properties of the motion that have no limit, so that `feasible` does not cover them.
     #[serde(default)]
     pub not_checked: Vec<String>,
     /// Assumptions for values that the study does not state.
@@ -96,30 +98,31 @@ pub struct DesignFile {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterForecast {
-    /// Symbol of the column.
+    /// Symbol of the regressor column.
     pub symbol: String,
     /// Expression of the base parameter.
     pub expression: String,
     /// Unit.
     pub unit: String,
-    /// Expected standard deviation from the motion alone; null if it is not excited.
+    /// Expected standard deviation from the motion alone; null if the motion does not excite the parameter.
     pub std: Option<f64>,
-    /// Expected standard deviation including the prior; null without a prior.
+    /// Expected standard deviation from motion and prior knowledge; null without prior knowledge.
     pub std_with_prior: Option<f64>,
-    /// `std` in percent of the prior value.
+    /// `std` in percent of the value in the robot description.
     pub relative_std_percent: Option<f64>,
     /// Value in the robot description.
     pub prior: Option<f64>,
 }
 
-/// A direction in the space of column-scaled parameters.
+/// A combination of base parameters, as a direction in the space of parameters that are scaled by the norms of their
+/// columns.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DirectionForecast {
-    /// Standard deviation in this direction relative to a single column: `1 / √λ` of the correlation-scaled
-    /// information.
+    /// Factor by which correlation with other parameters increases the standard deviation in this direction: `1 / √λ`,
+    /// with the eigenvalue λ of the information matrix scaled to unit diagonal.
     pub inflation: f64,
-    /// Symbols of the main columns with their shares, the largest first.
+    /// Symbols of the columns with the largest shares in the direction, and these shares, the largest first.
     pub terms: Vec<(String, f64)>,
 }
 
@@ -127,41 +130,43 @@ pub struct DirectionForecast {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WindowedFile {
-    /// Sequence in which joints move.
+    /// Order in which the joints move.
     pub problem: WindowedProblem,
     /// `gradient`, `cma-es`, `genetic`, or `given` for strokes in the study.
     pub optimiser: String,
-    /// H of equation 19: the sum of the condition numbers, plus penalties for violated limits.
+    /// Objective H of the design: the sum of the condition numbers, plus a penalty if a limit is violated (equation 19
+    /// of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*).
     pub fitness: f64,
-    /// The sum of the condition numbers.
+    /// Sum of the condition numbers of all windows.
     pub condition_sum: f64,
-    /// H of the best strokes within the limits, from exact gradients; null if none were found.
+    /// Smallest objective H that gradient-based optimisation finds within the limits; null if no strokes keep the
+    /// limits.
     pub optimum: Option<f64>,
     /// Excess of `condition_sum` over the optimum, percent (negative only for strokes that violate limits).
     pub above_optimum_percent: Option<f64>,
     /// The strokes, in the order of the joints' motion.
     pub strokes: Vec<StrokeFile>,
-    /// The strokes of the optimum.
+    /// The strokes that belong to `optimum`.
     pub optimum_strokes: Vec<StrokeFile>,
 }
 
-/// One joint's stroke.
+/// Stroke of one joint: a smooth motion from rest to rest.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StrokeFile {
     /// The joint.
     pub joint: String,
-    /// A, rad.
+    /// Amplitude A, rad.
     pub amplitude_rad: f64,
-    /// ω, 1/s.
+    /// Steepness ω, 1/s.
     pub steepness_per_s: f64,
-    /// h, rad.
+    /// Offset h of the position, rad.
     pub offset_rad: f64,
-    /// T, s.
+    /// Period T, s.
     pub period_s: f64,
-    /// δ, s.
+    /// Length δ of the window around the middle of the stroke, s.
     pub window_s: f64,
-    /// Condition number of the window.
+    /// Condition number of the regressor within the window.
     pub condition_number: f64,
     /// Limits, evaluated on the whole stroke, not only at samples.
     pub limits: Vec<StrokeLimitFile>,
@@ -173,11 +178,11 @@ pub struct StrokeFile {
 pub struct StrokeLimitFile {
     /// Limited quantity.
     pub quantity: StrokeQuantity,
-    /// Peak value, rad and s; positions relative to the offset.
+    /// Largest value along the stroke, in rad and s; a position is relative to the offset.
     pub value: f64,
     /// Upper limit.
     pub limit: f64,
-    /// Excess, percent of the limit; negative inside.
+    /// Excess over the limit, percent of the limit; negative if the value is below the limit.
     pub excess_percent: f64,
     /// Whether the limit is satisfied.
     pub kept: bool,
@@ -214,7 +219,7 @@ impl WindowedFile {
     }
 }
 
-/// Four decimals, or four significant digits of a small number.
+/// Text of a number with four decimals, or with four significant digits if it is small.
 fn digits(value: f64) -> String {
     if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
 }

@@ -11,7 +11,7 @@ pub const EVALUATION_SCHEMA: &str = "dynident/evaluation/1";
 pub struct EvaluationFile {
     /// [`EVALUATION_SCHEMA`].
     pub schema: String,
-    /// The computed quantity, by its name in the command.
+    /// The computed quantity, named as on the command line.
     pub quantity: String,
     /// Degrees of freedom.
     pub dof: usize,
@@ -21,7 +21,7 @@ pub struct EvaluationFile {
     pub columns: Vec<String>,
     /// The output file; null if `values` contains the table.
     pub file: Option<String>,
-    /// The table, row by row, SI units.
+    /// The table, row by row, SI units; null if it was written to a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values: Option<Vec<Vec<f64>>>,
 }

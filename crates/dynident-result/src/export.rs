@@ -12,13 +12,14 @@ pub const EXPORT_SCHEMA: &str = "dynident/export/1";
 pub struct ExportFile {
     /// [`EXPORT_SCHEMA`].
     pub schema: String,
-    /// The target, by its name in the command.
+    /// The export format, named as on the command line.
     pub target: String,
     /// Parts of the model that the target does not represent or represents differently, and problems of the model.
     pub notes: Vec<String>,
     /// The output file; null if `text` contains the export.
     pub file: Option<String>,
-    /// For drives from commands: the losses of the file, and the error of the motion simulated with it.
+    /// For servo drives identified from commands: what the file cannot represent, and the error of the motion simulated
+    /// with it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub servo_forms: Vec<ServoForm>,
     /// The exported text.

@@ -1,4 +1,4 @@
-//! The held-out error of an exported file, in a file next to it.
+//! Held-out error of an exported file; `dynident export` writes it next to the file.
 
 use super::forms::FormError;
 use super::provenance::Provenance;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`ExportValidationFile`].
 pub const EXPORT_VALIDATION_SCHEMA: &str = "dynident/export-validation/1";
 
-/// What was validated of an exported file: `NAME.validation.json` next to the file NAME.
+/// Validation of an exported file NAME, stored as `NAME.validation.json` in the same folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ExportValidationFile {
@@ -20,22 +20,23 @@ pub struct ExportValidationFile {
     pub provenance: Option<Provenance>,
     /// Name of the study.
     pub name: String,
-    /// The form by its name in `dynident export`; `dh` for a D-H table.
+    /// Export format, named as in `dynident export`; `dh` for a Denavit-Hartenberg table.
     pub form: String,
     /// Name of the exported file.
     pub file: String,
     /// SHA-256 of the exported file, as `sha256sum` prints it.
     pub sha256: String,
-    /// Whether the form cannot contain all torque terms of the result, so that the others were fitted again.
+    /// Whether the format lacks some torque terms of the result. The values of the remaining terms were then fitted
+    /// again.
     pub refitted: bool,
-    /// Error of the predicted torque of the file and of the identified model, one entry for each held-out log. Empty
-    /// without held-out logs, for payloads and for results of older versions.
+    /// Torque error of the exported file and of the identified model on each held-out log. Empty without held-out logs,
+    /// for payloads and for results of older versions.
     pub held_out: Vec<FormError>,
     /// Torque terms of the identified model that the file does not contain, with their values in the model.
     pub left_out: Vec<ModelTerm>,
-    /// The payload of the file with the interval of each value; null for models of the arm.
+    /// The exported payload with the interval of each value; null for models of the arm.
     pub payload: Option<ControllerPayload>,
-    /// For drives from commands: the error of the motion that is simulated with the file.
+    /// For servo drives identified from commands: the error of the motion that is simulated with the file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub servo_forms: Vec<ServoForm>,
     /// Problems of the result.

@@ -17,7 +17,7 @@ pub struct FactorsFile {
     pub bytes: u64,
     /// Name of the robot in its description.
     pub robot: String,
-    /// The logs, sorted by robot, time, name and hash.
+    /// The logs, sorted by individual robot, time, name and hash.
     pub logs: Vec<FactorsLog>,
 }
 
@@ -31,7 +31,7 @@ pub struct FactorsLog {
     pub arm: Option<String>,
     /// Time of recording, UTC: `2026-01-05T08:00:00Z`.
     pub recorded_at: Option<String>,
-    /// Hash of its numbers; equal hashes mean the same log.
+    /// SHA-256 of the log's numbers; equal hashes mean the same log.
     pub sha256: String,
     /// Number of filtered rows.
     pub rows: u64,

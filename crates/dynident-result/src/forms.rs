@@ -1,4 +1,4 @@
-//! The model in each class of forms, with its own held-out error.
+//! The identified model as each class of export formats can represent it, with its held-out error.
 
 use dynident_estimation::ValidationReport;
 use dynident_export::{ExportError, ModelFile, RobotModel};
@@ -6,38 +6,40 @@ use dynident_model::InertialParameters;
 use dynident_model::terms::{TermClass, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
-/// The model with the torque terms that a class of forms can hold.
+/// The model restricted to the torque terms that a class of export formats can contain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FormResult {
-    /// The class of terms.
+    /// The class of torque terms.
     pub class: TermClass,
-    /// Forms of `dynident export` that have this class.
+    /// Export formats of this class, named as in `dynident export`.
     pub forms: Vec<String>,
-    /// Whether terms of the identified model are missing in these forms, so that the others were fitted again.
+    /// Whether these formats lack some torque terms of the identified model. The values of the remaining terms were
+    /// then fitted again.
     pub refitted: bool,
-    /// The terms with their values.
+    /// The torque terms of this class with their values.
     pub terms: Vec<FormTerm>,
-    /// Error of the predicted torque, log by log.
+    /// Error of the predicted torque on each held-out log.
     pub held_out: Vec<FormError>,
 }
 
-/// The identified robot, complete: what `dynident export` needs.
+/// The complete identified robot: the input of `dynident export`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StoredModel {
-    /// Links, joints, limits and bodies.
+    /// Links, joints, limits and inertial parameters of the robot.
     pub robot: ModelFile,
     /// All torque terms with their values.
     pub terms: Vec<FormTerm>,
-    /// With load-dependent friction: the ten inertial parameters of each body whose torque is the load (see
-    /// `method.load_parameters`). They are base parameters, not those of physically consistent bodies.
+    /// Only with load-dependent friction: ten inertial parameters for each body. The rigid-body torque of these bodies
+    /// is the load in the friction law (see `method.load_parameters`). The values come from base parameters, so the
+    /// bodies need not be physically consistent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_bodies: Option<Vec<[f64; 10]>>,
 }
 
 impl StoredModel {
-    /// The robot with its terms.
+    /// The robot model with its torque terms.
     ///
     /// # Errors
     /// A model that cannot be read, or terms that do not match it.
@@ -51,51 +53,53 @@ impl StoredModel {
     }
 }
 
-/// A term of a form.
+/// A torque term of an export format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FormTerm {
-    /// Its symbol.
+    /// Symbol of the term's parameter.
     pub symbol: String,
-    /// Its value.
+    /// Value of the parameter.
     pub value: f64,
     /// The unit of the value.
     pub unit: String,
-    /// The term with its constants; joints by their numbers in `robot.joints`, from 0.
+    /// Function of the torque term with its constants. Joint numbers are indices of `robot.joints`, from 0.
     pub term: TorqueTerm,
 }
 
-/// The error of a form on one held-out log, next to that of the identified model.
+/// Torque error of an export format on one held-out log, compared with the identified model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FormError {
     /// The log.
     pub log: String,
-    /// RMS error of the form's torque, percent of the RMS of the measured torque; `None` if the torque is zero.
+    /// RMS error of the torque in this format, percent of the RMS of the measured torque; `None` if the measured torque
+    /// is zero.
     pub relative_error_percent: Option<f64>,
-    /// The same of the identified model: of the consistent set, if there is one.
+    /// RMS error of the identified model (of the physically consistent set, if there is one), percent of the RMS of the
+    /// measured torque.
     pub model_relative_error_percent: Option<f64>,
     /// The errors of every joint; empty in results of older versions.
     #[serde(default)]
     pub joints: Vec<FormJointError>,
 }
 
-/// The error of a form at one joint, next to that of the identified model.
+/// Torque error of an export format at one joint, compared with the identified model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FormJointError {
     /// The joint.
     pub joint: String,
-    /// RMS error of the form's torque, Nm (N for a prismatic joint).
+    /// RMS error of the torque in this format, Nm (N for a prismatic joint).
     pub rmse_nm: f64,
     /// RMS error, percent of the RMS of the measured torque; `None` if the torque is zero.
     pub relative_error_percent: Option<f64>,
-    /// The same of the identified model.
+    /// RMS error of the identified model, percent of the RMS of the measured torque.
     pub model_relative_error_percent: Option<f64>,
 }
 
 impl FormJointError {
-    /// Every joint of the reports of a form and of the model.
+    /// Pairs the errors of the export format and of the identified model, joint by joint.
     pub fn of_joints(form: &ValidationReport, model: &ValidationReport) -> Vec<Self> {
         let of_model = |name: &String| {
             let joint = model.joints.iter().find(|joint| joint.name == *name)?;
@@ -112,12 +116,12 @@ impl FormJointError {
 }
 
 impl FormResult {
-    /// Whether a term has a memory: for the class with state, whether it differs from code without state.
+    /// Whether friction with hysteresis is among the terms, so that code with state differs from code without state.
     pub fn has_memory(&self) -> bool {
         self.terms.iter().any(|one| one.term.has_memory())
     }
 
-    /// The errors of the form in sentences, one for each held-out log; `what` is the name of the form.
+    /// The errors of the export format in sentences, one for each held-out log; `what` is the name of the format.
     pub fn sentences(&self, what: &str) -> impl Iterator<Item = String> {
         let percent = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} %"));
         self.held_out.iter().map(move |error| {

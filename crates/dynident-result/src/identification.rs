@@ -34,7 +34,7 @@ pub struct ResultFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Reasons against loading the exported model into a robot; empty without any.
+    /// Reasons not to load the exported model into a robot; empty if there are none.
     #[serde(default)]
     pub problems: Vec<String>,
     /// Provenance; null in results of versions before 0.1.
@@ -42,7 +42,7 @@ pub struct ResultFile {
     pub provenance: Option<Provenance>,
     /// The robot.
     pub robot: RobotSummary,
-    /// How the fit was made.
+    /// Method and settings of the fit.
     pub method: MethodSummary,
     /// Test for bias by noise in the regressor; null if it is not possible.
     pub noise_in_regressor: Option<NoiseInRegressor>,
@@ -57,67 +57,70 @@ pub struct ResultFile {
     /// Periods and their noise, in results of earlier versions with the estimator `maximum-likelihood`; otherwise
     /// null.
     pub periodic: Option<PeriodicFit>,
-    /// Fourier motion and noise of every training log; only for the estimator `simultaneous` with a period.
+    /// Fourier series of the motion, and noise, of every training log; only for the estimator `simultaneous` with a
+    /// period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<Vec<SeriesFit>>,
-    /// Spline motion and noise of every training log; only for the estimators `simultaneous`
-    /// without a period and `maximum-likelihood`.
+    /// Spline fit of the motion, and noise, of every training log; only for the estimators `simultaneous` without a
+    /// period and `maximum-likelihood`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline_motion: Option<SplineFit>,
-    /// The simulated loop; null unless the estimator is `didim`, `clie` or `cloe`.
+    /// Result of the simulated closed loop; null unless the estimator is `didim`, `clie` or `cloe`.
     pub simulated: Option<SimulatedFit>,
-    /// The base parameters, in the order of the tree.
+    /// The base parameters, in the order of the links from base to tip.
     pub base_parameters: Vec<BaseParameterResult>,
-    /// Covariance of the base parameters, in their order, by the method in `method.covariance`; zero for unexcited
-    /// parameters.
+    /// Covariance of the base parameters, computed as `method.covariance` states; rows and columns in the order of
+    /// `base_parameters`. Zero for unexcited parameters.
     #[serde(default, deserialize_with = "rows")]
     #[cfg_attr(feature = "schema", schemars(with = "Vec<Vec<Option<f64>>>"))]
     pub base_parameter_covariance: Vec<Vec<f64>>,
-    /// Covariance of the base parameters for tests of several parameters together, as `compare` makes them: with few
-    /// segments `base_parameter_covariance` has too small eigenvalues, so white errors are mixed in. Empty in results
-    /// of earlier versions.
+    /// Covariance of the base parameters for tests of several parameters together, such as those of `compare`. With few
+    /// time segments, `base_parameter_covariance` has eigenvalues that are too small; this matrix is therefore mixed
+    /// with the covariance for white errors. Empty in results of earlier versions.
     #[serde(default, deserialize_with = "rows", skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(feature = "schema", schemars(with = "Vec<Vec<Option<f64>>>"))]
     pub base_parameter_joint_covariance: Vec<Vec<f64>>,
-    /// The bodies: of all full sets with these base parameters the nearest to the prior.
+    /// Inertial parameters of every body. Many sets of values give the same base parameters; this set is the nearest to
+    /// the robot description.
     pub bodies: Vec<BodyResult>,
-    /// Which bodies differ from the robot description, with the torque error after each is restored; null without a
-    /// description of all bodies, and in results of earlier versions.
+    /// Which bodies differ from the robot description, and the torque error if one of them gets the values of the
+    /// description again. Null if the description does not contain all bodies, and in results of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description_differences: Option<DescriptionComparison>,
-    /// Interval of every body and term parameter over the physically consistent sets that the data do not reject; null
-    /// unless requested.
+    /// Interval of every inertial and friction parameter over all physically consistent sets that the data do not
+    /// reject; null unless the study requests it.
     pub possible_intervals: Option<Vec<ParameterInterval>>,
-    /// Poorly determined parameters that were fixed at zero; null unless requested.
+    /// Poorly determined parameters that were fixed at zero; null unless the study requests this.
     pub essential: Option<EssentialReport>,
     /// The strongest correlations between estimates, strongest first.
     #[serde(default)]
     pub correlations: Vec<CorrelatedPair>,
-    /// Friction and drives.
+    /// Friction and drive parameters of each joint.
     pub joints: Vec<JointResult>,
-    /// Test for drive inertia of the joints where no key states it; null if keys state it for all joints.
+    /// Test for drive inertia of the joints for which no study key states it; null if keys state it for all joints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive_inertia_choice: Option<DriveInertiaChoice>,
     /// Selection of friction, for the joints where it applies.
     #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
-    /// The complete identified robot, for `dynident export`; `None` for payloads on a known arm, for bodies with
-    /// unknown parameters, and in results of older versions.
+    /// The complete identified robot, the input of `dynident export`; `None` for payloads on a known arm, for bodies
+    /// with unknown parameters, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<StoredModel>,
-    /// The model in each class of forms that `dynident export` writes, with its own held-out error; empty for payloads
-    /// on a known arm, with unknown gains, and in results of older versions.
+    /// The model as each class of export formats can represent it, with its held-out error; empty for payloads on a
+    /// known arm, with unknown gains, and in results of older versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forms: Vec<FormResult>,
     /// Estimated payloads.
     #[serde(default)]
     pub payloads: Vec<PayloadResult>,
-    /// Offsets of each log; empty unless the study requests them. The base parameters contain their mean.
+    /// Constant torque of each joint in each log, relative to the mean over the logs; empty unless the study requests
+    /// separate offsets. The base parameters contain the mean.
     #[serde(default)]
     pub offsets: Vec<LogOffset>,
     /// Drive gains of each joint; null unless the study declares them unknown.
     pub drive_gains: Option<Vec<DriveGain>>,
-    /// Drives coupled to two joints.
+    /// Parameters of drives that two joints share.
     #[serde(default)]
     pub couplings: Vec<TermResult>,
     /// Fit to the training logs.
@@ -128,11 +131,11 @@ pub struct ResultFile {
     /// Coverage of the 95 % band of the predicted torque on held-out logs.
     #[serde(default)]
     pub torque_band: Vec<TorqueBand>,
-    /// Whether the full set is physically consistent.
+    /// Whether the set of all inertial and friction parameters is physically consistent.
     pub physical: PhysicalVerdict,
     /// Import findings of each log.
     pub logs: Vec<LogSummary>,
-    /// Examination of the study by alternative hypotheses; null if it was not needed.
+    /// Comparison of hypotheses about mistakes in the study; null if it was not needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub check: Option<StudyCheck>,
     /// Reason for a missing identified.urdf; null if it exists.
@@ -173,13 +176,13 @@ pub struct MethodSummary {
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,
-    /// Number of solutions.
+    /// Number of iterations of the estimator.
     pub iterations: usize,
-    /// Parts of the study with code of the caller, each with its function name; this code is required to reproduce the
-    /// result, and to use it where those parts are needed.
+    /// Functions that the caller's program supplied for parts of the study, by name. The same functions are necessary
+    /// to reproduce the result, and to use it where those parts are needed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub functions: Vec<String>,
-    /// Assumption of the error bars.
+    /// Assumption about the residuals behind the error bars.
     pub covariance: String,
     /// Number of time segments for the covariance.
     pub clusters: usize,
@@ -191,39 +194,43 @@ pub struct MethodSummary {
     /// Lag of the torque behind the motion: estimate and compensated part.
     #[serde(default)]
     pub torque_lag: LagChoice,
-    /// Parameter differences between training logs relative to their error bars; the error bars of `base_parameters`
-    /// include the excess. Null for a single log.
+    /// Differences of the parameters between training logs, relative to their error bars. If the differences exceed the
+    /// error bars, those of `base_parameters` are increased accordingly. Null for a single log.
     #[serde(default)]
     pub between_logs: Option<LogVariation>,
-    /// Held-out figures are for torque below 0.7 times this frequency, the cut-off from the spectrum of the motion, Hz;
-    /// null if they use the band of the fit.
+    /// Cut-off from the spectrum of the motion, Hz: held-out errors are for torque below 0.7 times this frequency. Null
+    /// if held-out errors use the same band as the fit.
     #[serde(default)]
     pub motion_hz: Option<f64>,
     /// Condition number of the weighted regressor's base columns.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number: f64,
-    /// The same after division of each column by its norm.
+    /// Condition number of the same columns after each is divided by its norm.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number_scaled: f64,
-    /// Method of selecting the base columns.
+    /// Method that selects the independent columns of the regressor, which define the base parameters.
     pub base_columns: String,
-    /// Smallest relative residual of an independent column, and largest of a dependent one.
+    /// Margin of that selection: the smallest relative residual of a column that was classified as independent, and the
+    /// largest of a column that was classified as dependent.
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; fixed at the prior (or zero).
     #[serde(default)]
     pub not_excited: Vec<String>,
-    /// Declared torques that coincide with those of other parameters; their coefficients stay near the nominal values.
+    /// Torques declared by `[[torque]]` whose columns coincide with those of other parameters; their coefficients stay
+    /// near the nominal values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coincident: Vec<String>,
     /// Joints that no training log moves above the noise of their positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resting_joints: Vec<String>,
-    /// Standard deviation of stated gains, percent, as included in the error bars of payloads; null if they are exact.
+    /// Relative standard deviation of the stated torque gains, percent, as included in the error bars of payloads; null
+    /// if the gains are exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_std_percent: Option<f64>,
-    /// With load-dependent friction: base parameters of an estimate without it, whose torque is the load.
+    /// Only with load-dependent friction: base parameters of an earlier estimate without such friction. The torque that
+    /// they predict is the load in the friction law.
     pub load_parameters: Option<Vec<f64>>,
 }
 
@@ -238,9 +245,9 @@ impl MethodSummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BaseParameterResult {
-    /// Symbol of the independent column: `Izz1`.
+    /// Symbol of the regressor column that represents the base parameter: `Izz1`.
     pub symbol: String,
-    /// Expression: `Izz1 + 0.49 m2`.
+    /// Expression of the base parameter: `Izz1 + 0.49 m2`.
     pub expression: String,
     /// Unit at a revolute joint.
     pub unit: String,
@@ -248,11 +255,11 @@ pub struct BaseParameterResult {
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub value: f64,
-    /// Standard deviation, from the covariance of the method.
+    /// Standard deviation, computed as `method.covariance` states.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub std: f64,
-    /// Standard deviation for white residuals, for comparison.
+    /// Standard deviation under the assumption of white residuals, for comparison.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub std_white: f64,
@@ -260,27 +267,28 @@ pub struct BaseParameterResult {
     #[serde(default, deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub half_width_95: f64,
-    /// `100 std / |value|`.
+    /// `100 std / |value|`; null for a zero value.
     pub relative_std_percent: Option<f64>,
     /// Value in the robot description.
     pub prior: Option<f64>,
-    /// Value of the physically consistent set in `bodies` and `joints`; null unless requested.
+    /// Value in the physically consistent set of `bodies` and `joints`; null unless the study requests such a set.
     #[serde(default)]
     pub physical: Option<f64>,
-    /// Parameters fixed at nominal on which this value depends, the strongest first. Empty if the logs determine the
-    /// value.
+    /// Parameters that were fixed at nominal values and influence this value, the strongest first. Empty if the logs
+    /// determine the value.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub conditional_on: Vec<Condition>,
-    /// Half-width of the 95 % interval including the uncertainty of those nominal values (masses by 30 %, for example);
-    /// for an unexcited parameter, the uncertainty of its nominal value. Null if the logs determine the value, or
-    /// without nominal values.
+    /// Half-width of the 95 % interval, including the uncertainty of the nominal values in `conditional_on` (masses by
+    /// 30 %, for example). For an unexcited parameter: the uncertainty of its nominal value. Null if the logs determine
+    /// the value, or without nominal values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_width_95_with_nominal: Option<f64>,
-    /// Standard deviation per error source, if there are others than noise; the squares add up to the total variance.
-    /// Empty for an unexcited parameter.
+    /// Standard deviation from each error source, if noise is not the only source; the squares add up to the total
+    /// variance. Empty for an unexcited parameter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub error_terms: Vec<ErrorTermResult>,
-    /// False if the data do not excite it; then `value` is the prior and `std` is meaningless.
+    /// False if the data do not excite the parameter. Then `value` is the value of the robot description and `std` is
+    /// meaningless.
     pub excited: bool,
 }
 
@@ -304,7 +312,7 @@ impl BaseParameterResult {
     }
 }
 
-/// One body of the full set.
+/// Inertial parameters of one body.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodyResult {
@@ -327,12 +335,12 @@ pub struct BodyResult {
     /// Source of each of the ten values; null in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sources: Option<[ValueSource; 10]>,
-    /// Standard deviation of each of the ten values from the logs and the robot description: that of the logs for an
-    /// identified value, that of the robot description for an unidentified one. 1.96 times it is the
-    /// half width of the interval that contains 95 % of the mixture over all explanations of the difference from the
-    /// description, so that a description that the logs contradict widens it; without a complete description, nominal
-    /// values have 30 % uncertainty. Null for a body that is not described, and if the
-    /// bodies are not the physically consistent set.
+    /// Standard deviation of each of the ten values, from logs and robot description together. It is that of the logs
+    /// for an identified value, and that of the robot description for an unidentified one. The half-width of the 95 %
+    /// interval is 1.96 times this value. The interval covers all explanations of the differences from the description,
+    /// weighted by their probability, so it is wider if the logs contradict the description. Without a complete
+    /// description, nominal values have 30 % uncertainty. Null for a body without description, and if the bodies are
+    /// not the physically consistent set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<[f64; 10]>,
 }
@@ -344,13 +352,13 @@ pub struct BodyResult {
 pub enum ValueSource {
     /// Identified from torque.
     Measured,
-    /// Identified in sums with others; the value is the nearest to the robot description.
+    /// Identified only as part of a sum with other values; the stated value is the nearest to the robot description.
     Partly,
-    /// Not identified: near the robot description, as far as physical consistency allows.
+    /// Not identified: as near to the robot description as physical consistency allows.
     Nominal,
 }
 
-/// A parameter of a term.
+/// A friction or drive parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TermResult {
@@ -358,13 +366,13 @@ pub struct TermResult {
     pub symbol: String,
     /// Unit at a revolute joint.
     pub unit: String,
-    /// Value in the full set of `bodies`: physically consistent unless `estimator.physical` is false.
+    /// Value in the parameter set of `bodies`, which is physically consistent unless `estimator.physical` is false.
     pub value: f64,
-    /// Standard deviation of the unconstrained estimate; null if it is not a separate base parameter.
+    /// Standard deviation of the unconstrained estimate; null if the parameter is not a separate base parameter.
     pub std: Option<f64>,
-    /// The base parameter that contains it.
+    /// The base parameter that contains this parameter.
     pub base_parameter: Option<String>,
-    /// Function of a declared torque, with joints by number.
+    /// Function of a torque declared by `[[torque]]`, with joints by number; null for other terms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<String>,
 }
@@ -375,17 +383,17 @@ pub struct TermResult {
 pub struct JointResult {
     /// The joint.
     pub name: String,
-    /// The terms.
+    /// Friction and drive parameters.
     #[serde(rename = "laws")]
     pub terms: Vec<TermResult>,
     /// Standard deviation of the filtered residual, Nm (N).
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub residual_std_nm: f64,
-    /// Lag-1 correlation of the residual that determines the error bars.
+    /// Correlation of the residual between successive filtered rows, which the error bars include.
     pub residual_correlation: Option<f64>,
-    /// Lag of the torque behind the motion from all training logs, including the compensated part; null if it is not
-    /// identifiable. It is marked if the remaining lag matters.
+    /// Time by which the joint's torque is later than its motion, from all training logs, including the compensated
+    /// part; null if it is not identifiable. An entry states whether the remaining lag is large enough to matter.
     pub torque_lag: Option<TorqueLag>,
 }
 
@@ -397,7 +405,7 @@ pub struct LogOffset {
     pub log: String,
     /// The joint.
     pub joint: String,
-    /// Deviation from the mean over the training logs, Nm (N).
+    /// Offset in this log minus the mean over the training logs, Nm (N).
     pub deviation_nm: f64,
     /// Standard deviation of the deviation, Nm (N).
     #[serde(deserialize_with = "number")]
@@ -411,13 +419,13 @@ pub struct LogOffset {
 pub struct TrainingResult {
     /// The logs.
     pub logs: Vec<String>,
-    /// Filtered rows of each joint.
+    /// Number of filtered rows of each joint.
     pub samples: usize,
-    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    /// Relative error of the predicted torque, `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
     pub relative_error_percent: Option<f64>,
     /// Figures per joint.
     pub joints: Vec<TrainingJoint>,
-    /// The same for the physically consistent set, which is exported; null without one.
+    /// Errors of the physically consistent set, which is exported; null if there is none.
     #[serde(default)]
     pub physical: Option<TrainingErrors>,
 }
@@ -426,7 +434,7 @@ pub struct TrainingResult {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TrainingErrors {
-    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    /// Relative error of the predicted torque, `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
     pub relative_error_percent: Option<f64>,
     /// Figures per joint.
     pub joints: Vec<TrainingJoint>,
@@ -440,62 +448,64 @@ pub struct TrainingJoint {
     pub name: String,
     /// Root mean square residual, Nm (N).
     pub rmse_nm: f64,
-    /// `100 ‖τ - τ̂‖ / ‖τ‖`.
+    /// Relative error of the predicted torque, `100 ‖τ - τ̂‖ / ‖τ‖`.
     pub relative_error_percent: Option<f64>,
 }
 
-/// Whether a full set is physically consistent.
+/// Whether a set of all inertial and friction parameters is physically consistent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PhysicalVerdict {
-    /// All pseudo-inertias positive definite, no negative friction or drive inertia.
+    /// Whether all pseudo-inertias are positive definite, and no friction or drive inertia is negative.
     pub consistent: bool,
-    /// Violations.
+    /// Violated conditions, in words.
     #[serde(default)]
     pub violations: Vec<String>,
-    /// Subject of the verdict.
+    /// Which parameter set the verdict is about.
     pub note: String,
-    /// The physically consistent fit for the bodies; null if it was not requested or failed.
+    /// Quality of the physically consistent fit; null if it was not requested or failed.
     pub fit: Option<PhysicalFitResult>,
-    /// Reason of a failure.
+    /// Reason for the failure of the physically consistent fit.
     pub failure: Option<String>,
-    /// Bodies with inconsistent nominal inertia, for which the prior is an approximate body of ordinary mass.
+    /// Bodies whose inertia in the robot description is not physically consistent. Their prior is an approximate body
+    /// of ordinary mass instead.
     #[serde(default)]
     pub impossible_priors: Vec<String>,
-    /// Sign of the torque that a physically consistent set explains; null without a physically consistent set for
-    /// either sign.
+    /// Test whether the torque has the right sign: which sign a physically consistent set explains. Null if no such set
+    /// explains either sign.
     pub sign: Option<TorqueSignCheck>,
 }
 
-/// A physically consistent fit.
+/// Quality of a physically consistent fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PhysicalFitResult {
-    /// `solved`, `stalled` or `iteration-limit`; all of them satisfy every constraint.
+    /// `solved`, `stalled` or `iteration-limit`. In all three cases, the result satisfies every constraint.
     pub status: String,
     /// Solver iterations.
     pub iterations: usize,
-    /// Relative stationarity of its certificate.
+    /// Relative stationarity of the optimality certificate; zero at the exact optimum.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub stationarity: f64,
-    /// Relative duality gap of its certificate.
+    /// Relative duality gap of the optimality certificate; zero at the exact optimum.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub duality_gap: f64,
-    /// Distance of the base parameters from the estimate, in standard deviations for white residuals.
+    /// Distance of the base parameters of this fit from the unconstrained estimate, in standard deviations for white
+    /// residuals.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub moved_sigma: f64,
-    /// Largest change of a base parameter in units of its reported standard deviation.
+    /// Largest change of a base parameter by the constraints, in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
-    /// Test whether the logs contradict the consistent set; null if it is not possible.
+    /// Test whether the logs contradict the physically consistent set; null if the test is not possible.
     #[serde(default)]
     pub difference: Option<ConsistencyTest>,
-    /// Active constraints: friction or drive inertia at zero.
+    /// Active constraints: friction or drive inertia that the fit holds at zero.
     #[serde(default)]
     pub active: Vec<String>,
-    /// Figures per body.
+    /// Physical consistency of each body.
     pub bodies: Vec<PhysicalBodyResult>,
 }
 
@@ -505,7 +515,8 @@ pub struct PhysicalFitResult {
 pub struct PhysicalBodyResult {
     /// Name.
     pub name: String,
-    /// Smallest eigenvalue of the pseudo-inertia relative to the body in the robot description.
+    /// Smallest eigenvalue of the pseudo-inertia, relative to the body in the robot description; positive for a
+    /// consistent body.
     pub margin: f64,
     /// Whether the constraint of this body is active.
     pub on_the_boundary: bool,
@@ -529,25 +540,25 @@ pub struct LogSummary {
     pub filtered_rate_hz: f64,
     /// Filtered rows of each joint.
     pub filtered_rows: u64,
-    /// Agreement of the log with the inertials of the robot description.
+    /// How well the inertial parameters of the robot description predict the torque of the log.
     pub prior_agreement: Option<PriorAgreement>,
-    /// Lag of torque behind motion of each joint, s, estimated with the model from this log alone; null if it is not
-    /// identifiable.
+    /// Time by which the torque of each joint is later than its motion, s, estimated with the model from this log
+    /// alone; null if it is not identifiable.
     #[serde(default)]
     pub torque_lag_s: Vec<Option<f64>>,
     /// Standard deviations of the lags, s.
     #[serde(default)]
     pub torque_lag_std_s: Vec<Option<f64>>,
-    /// Half-widths of their 95 % intervals, s.
+    /// Half-widths of the 95 % intervals of the lags, s.
     #[serde(default)]
     pub torque_lag_half_width_95_s: Vec<Option<f64>>,
     /// Velocity histogram of each joint, in the order of `robot.joints`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub velocities: Vec<VelocityHistogram>,
-    /// Findings from the model.
+    /// Findings from the residuals of the model.
     #[serde(default)]
     pub model_findings: Vec<Finding>,
-    /// Intervals and slow changes that no single model explains; missing without any.
+    /// Intervals and slow changes of the log that no single model explains; missing if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<LogEvent>,
 }
@@ -559,16 +570,16 @@ pub struct Timings {
     /// Time of creation, UTC: `2026-11-22T10:30:13Z`.
     #[serde(default)]
     pub made_at: String,
-    /// Reading the robot, base parameters.
+    /// Time for reading the robot and computing the base parameters.
     #[serde(rename = "machine")]
     pub robot: f64,
-    /// Logs to triangular factors.
+    /// Time for reducing the logs to triangular factors.
     pub logs: f64,
-    /// Factors to estimates.
+    /// Time for computing the estimates from the factors.
     pub estimation: f64,
-    /// Held-out logs.
+    /// Time for the held-out logs.
     pub validation: f64,
-    /// Total.
+    /// Total time.
     pub total: f64,
 }
 
@@ -578,24 +589,27 @@ pub struct Timings {
 pub struct JointFrictionResult {
     /// The joint.
     pub joint: String,
-    /// The selected friction, or the reason why the study's keys stay in force.
+    /// The selected friction law, or the reason why the study's keys stay in force.
     pub chosen: String,
     /// The selection as keys of `[drive.joints.NAME]`; null without a selection.
     pub drive: Option<JointDrive>,
-    /// Constants of the selected terms, estimated with all parameters; null if they were stated.
+    /// Nonlinear constants of the selected terms, estimated together with all parameters; null if the study states
+    /// them.
     #[serde(default)]
     pub constants: Vec<FrictionConstant>,
-    /// Number of time blocks of the cross-validation.
+    /// Number of time blocks of the cross-validation that selects the friction law.
     pub folds: usize,
-    /// The compared candidates, each with its best constants.
+    /// The compared friction laws, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
-    /// The selection among all laws, if `drive.candidates` or `drive.exportable` restricts them.
+    /// Law that would be selected without the restriction by `drive.candidates` or `drive.exportable`; null without a
+    /// restriction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unrestricted: Option<UnrestrictedFriction>,
 }
 
 impl JointFrictionResult {
-    /// What the restriction of the laws costs, as a phrase; `None` without a restriction or if it costs nothing.
+    /// How much accuracy the restriction of the laws costs, as a phrase; `None` without a restriction, or if it costs
+    /// nothing.
     pub fn restriction(&self) -> Option<String> {
         let free = self.unrestricted.as_ref().filter(|free| free.chosen != self.chosen)?;
         Some(format!(

@@ -27,9 +27,9 @@ pub struct Inspection {
     pub bodies: Vec<BodySummary>,
     /// Base parameters of the bodies.
     pub base_parameters: BaseSummary,
-    /// Findings of the audit.
+    /// Findings about implausible values in the robot description.
     pub audit: Vec<AuditEntry>,
-    /// Errors that explain problems of the inertials; `inspect --fix` corrects them.
+    /// Mistakes in the robot description that explain implausible inertias; `inspect --fix` corrects them.
     #[serde(default)]
     pub slips: Vec<SlipEntry>,
 }
@@ -51,7 +51,7 @@ pub struct SlipEntry {
     pub corrections: Vec<CorrectionEntry>,
 }
 
-/// One number of one `<inertial>`.
+/// Correction of one number of one `<inertial>`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CorrectionEntry {
@@ -84,7 +84,7 @@ pub struct JointSummary {
     pub velocity: Option<f64>,
     /// Effort limit, Nm or N.
     pub effort: Option<f64>,
-    /// The joint that it mimics.
+    /// The joint that this joint mimics.
     pub mimic: Option<String>,
 }
 
@@ -106,23 +106,24 @@ pub struct BodySummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BaseSummary {
-    /// Number.
+    /// Number of base parameters.
     pub count: usize,
     /// Expressions, with the shortest factors that convert back to the same number.
     pub expressions: Vec<String>,
     /// Names: the expressions with six digits, without factors that rounded angles cause.
     #[serde(default)]
     pub names: Vec<String>,
-    /// Unidentifiable parameters.
+    /// Inertial parameters that do not change any torque, so that no motion identifies them.
     pub unidentifiable: Vec<String>,
-    /// Rank of the bodies' regressor at random states, by
-    /// [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body), as a cross-check.
+    /// Rank of the bodies' regressor at random states, from
+    /// [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body); it should equal `count`.
     pub numerical_rank: usize,
-    /// Smallest relative residual of an independent column, and largest of a dependent one.
+    /// Margin of the classification of columns: the smallest relative residual of an independent column, and the
+    /// largest of a dependent one.
     pub gap: [f64; 2],
 }
 
-/// One finding.
+/// One finding about the robot description.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct AuditEntry {

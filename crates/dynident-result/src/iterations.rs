@@ -15,10 +15,10 @@ use std::path::Path;
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
 
-/// Status of an iteration that was stopped.
+/// Value of `status` if an iteration was stopped by the user.
 pub const INTERRUPTED: &str = "interrupted";
 
-/// `iterations.json`.
+/// Content of `iterations.json`: all runs of an iteration with their results.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationsFile {
@@ -39,26 +39,28 @@ pub struct IterationsFile {
     /// Unmet conditions after the last run; empty if the iteration has converged, and in files of earlier versions.
     #[serde(default)]
     pub unmet: Vec<UnmetConditionEntry>,
-    /// Forecast of a further run that was not worthwhile, if motions are redesigned and all conditions are met.
+    /// Forecast for one more run, which was not worthwhile. Only if motions are redesigned and all conditions of
+    /// convergence are met.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declined: Option<RunForecast>,
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Joints whose loops are slower than `bandwidth_hz` for stability with delay; empty if the gains are stated.
+    /// Joints whose control loops had to be slower than `bandwidth_hz` to be stable with the delay of the robot; empty
+    /// if the study states the gains.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lowered_bandwidths: Vec<LoweredBandwidth>,
-    /// Duration of each run, s; for sequential legs, the sum over all legs.
+    /// Duration of each run, s. If a run consists of several trajectories (legs), the sum of their durations.
     pub duration_s: f64,
     /// The runs.
     pub runs: Vec<IterationRun>,
-    /// Largest tracking error (mean over the joints) of the first accepted run divided by that of the last; null for
-    /// fewer than two runs.
+    /// Ratio of the tracking errors (largest error of each joint, averaged over the joints): first accepted run divided
+    /// by the last. Null for fewer than two runs.
     pub tracking_improvement: Option<f64>,
-    /// Error of the parameters that the last accepted run alone gives, relative to the Cramér-Rao bound (ratio of root
-    /// mean squares). Only for simulated robots with torque noise, because both need the truth.
+    /// Parameter error of the last accepted run alone, divided by the Cramér-Rao bound (root mean squares). Only for
+    /// simulated robots with torque noise, because the true parameters must be known.
     pub error_over_bound: Option<f64>,
-    /// Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated sensors
-    /// at every recorded sample, exact positions.
+    /// Cramér-Rao bound (smallest possible standard deviation) of every parameter for one run of the first motion. It
+    /// assumes exact positions, and white torque noise of the simulated sensors in every recorded sample.
     pub bound: Option<Vec<f64>>,
     /// The base parameters from all accepted runs, as in `result.json`; empty until the last run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -66,12 +68,13 @@ pub struct IterationsFile {
     /// Reason for a missing `result.json` after an accepted run; null if it exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_result: Option<String>,
-    /// All parameters of the last accepted physically consistent set: ten per body, one per term.
+    /// All parameters of the last accepted physically consistent set: ten for each body, then one for each friction or
+    /// drive term.
     pub possible_parameters: Option<Vec<f64>>,
 }
 
 impl IterationsFile {
-    /// Reads the file of an iteration.
+    /// Reads `iterations.json`.
     ///
     /// # Errors
     /// A file that cannot be read or has another version.
@@ -120,7 +123,7 @@ impl IterationsFile {
         })
     }
 
-    /// Limitations of the torque check of the last accepted run; empty if it checked everything.
+    /// What the torque check of the last accepted run could not check, in words; empty if it checked everything.
     pub fn unchecked_torque(&self) -> Vec<String> {
         let Some(last) = self.runs.iter().rfind(|run| run.accepted) else { return Vec::new() };
         let Some(check) = &last.torque_check else {
@@ -172,26 +175,27 @@ impl IterationsFile {
     }
 }
 
-/// Predicted and actual improvement by the motion of a run. Error bars are those of the (at most) ten least known
-/// directions, in terms of the torque uncertainty over the workspace: their root mean square.
+/// Predicted and actual improvement of the error bars by the motion of a run. The improvement is that of the root mean
+/// square over the (at most) ten least known combinations of parameters, expressed as torque uncertainty over the
+/// workspace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunForecast {
-    /// Whether the motion differs from that of the accepted run before.
+    /// Whether the motion differs from that of the previous accepted run.
     pub redesigned: bool,
     /// Reason for repeating the motion although a new one was designed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Predicted reduction of the error bars, percent.
     pub gain_percent: f64,
-    /// The same for a repetition of the previous motion.
+    /// Predicted reduction of the error bars if the previous motion were repeated, percent.
     pub repeat_gain_percent: f64,
-    /// Actual reduction; null for a run that was not made or was rejected.
+    /// Actual reduction of the error bars, percent; null for a run that was not made or was rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_gain_percent: Option<f64>,
     /// Predicted standard deviation of every base parameter after the run; null for an undetermined one.
     pub std: Vec<Option<f64>>,
-    /// Largest torque of each joint along the motion within the model uncertainty (95 %), Nm (N).
+    /// Largest torque of each joint along the motion, including the 95 % uncertainty of the model, Nm (N).
     pub largest_torque: Vec<f64>,
 }
 
@@ -217,12 +221,12 @@ impl RunForecast {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UnmetConditionEntry {
-    /// The condition with its numbers.
+    /// The unmet condition with its numbers.
     #[serde(flatten)]
     pub shortfall: UnmetCondition,
-    /// Message.
+    /// The condition in a sentence.
     pub message: String,
-    /// Remedy.
+    /// How to meet the condition.
     pub remedy: String,
 }
 
@@ -232,16 +236,17 @@ pub struct UnmetConditionEntry {
 pub struct IterationRun {
     /// Run number, from 1.
     pub run: usize,
-    /// Leg number, from 1, if each leg has a separate iteration; null otherwise.
+    /// Number of the leg (one of several trajectories), from 1, if each leg is iterated separately; null otherwise.
     pub leg: Option<usize>,
     /// The controller.
     pub controller: String,
-    /// Whether the controller had a model.
+    /// Whether the controller used a robot model.
     pub model_based: bool,
-    /// Run whose physically consistent set (or estimate) was the controller's model; null for the robot description, an
-    /// intermediate step, or no model.
+    /// Run whose physically consistent set (or estimate) was the controller's model. Null if the controller used the
+    /// robot description, a model between two estimates, or no model.
     pub model_of_run: Option<usize>,
-    /// Fraction of the step from the last accepted parameters.
+    /// Fraction of the step from the last accepted parameters to the new estimate that the controller's model contains;
+    /// 1 for the new estimate itself.
     pub damping: f64,
     /// Factor on the gains of the controller without a model.
     pub stiffness: f64,
@@ -256,7 +261,7 @@ pub struct IterationRun {
     /// Result of the warm-up before the run; null without a warm-up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
-    /// Held-out run after this run with the accuracy of the model's prediction; null without one.
+    /// Held-out run that followed this run, with the error of the model's torque prediction; null if there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutRun>,
     /// Parameters from this run alone.
@@ -267,23 +272,26 @@ pub struct IterationRun {
     /// Deviation of the constant torques of each accepted run from their mean; empty if the runs share them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub run_offsets: Vec<RunOffset>,
-    /// Evidence from the log in addition to parameters, per joint; null for an incomplete run.
+    /// Further findings from the log of the run, for each joint; null for an incomplete run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
     /// Comparison of logged and commanded torque; null if too little was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_check: Option<TorqueCheck>,
-    /// Predicted and actual improvement by the motion; null without redesign or without earlier knowledge.
+    /// Predicted and actual improvement by the motion; null if motions are not redesigned, or before the first
+    /// estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forecast: Option<RunForecast>,
-    /// Cramér-Rao bound of a run with this motion if it differs from the first; for simulated robots with torque noise.
+    /// Cramér-Rao bound (smallest possible standard deviation of every parameter) of a run with this motion, if the
+    /// motion differs from the first one. Only for simulated robots with torque noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<Vec<f64>>,
-    /// Lag of each joint's torque behind the motion from this run alone; null if it is not identifiable or windows
-    /// exclude rows, empty for the step-by-step scheme.
+    /// Time by which each joint's torque is later than its motion, from this run alone. Null if it is not identifiable,
+    /// or if only windows of the log are used; empty for the step-by-step scheme.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
-    /// The selected method for velocities and accelerations, with the alternatives; null if it was stated.
+    /// The selected method for velocities and accelerations, with the compared alternatives; null if the study states
+    /// the method.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
 }
@@ -300,7 +308,7 @@ impl IterationRun {
         ))
     }
 
-    /// Parameters known after this run: from all accepted runs, or from this run without pooling.
+    /// Parameters known after this run: from all accepted runs if they are pooled, otherwise from this run alone.
     pub fn known(&self) -> &[IterationParameter] {
         if self.pooled.is_empty() { &self.parameters } else { &self.pooled }
     }
@@ -310,7 +318,7 @@ impl IterationRun {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationParameter {
-    /// Symbol of its column.
+    /// Symbol of the regressor column.
     pub symbol: String,
     /// Expression.
     pub expression: String,
@@ -320,6 +328,6 @@ pub struct IterationParameter {
     pub value: f64,
     /// Standard deviation; null if the run does not determine it.
     pub std: Option<f64>,
-    /// Value minus true value of the simulated robot; null for a real one.
+    /// Estimate minus true value, for a simulated robot; null for a real one.
     pub error: Option<f64>,
 }

@@ -31,12 +31,14 @@ pub struct LogContents {
 }
 
 impl LogContents {
-    /// Whether its groups are episodes, separate recordings that `part` of a study selects, not topics with one clock.
+    /// Whether the groups are episodes (separate recordings, of which `part` in a study selects one) instead of topics
+    /// with one clock.
     pub fn has_episodes(&self) -> bool {
         self.format == FileFormat::Hdf5.name() && self.groups.iter().any(|group| group.name.is_some())
     }
 
-    /// Each episode with its name, as the contents of a separate file; itself for a single recording.
+    /// Splits the contents into episodes, each with its name and as if from a separate file; a single recording is
+    /// returned unchanged.
     pub fn episodes(self) -> Vec<(Option<String>, Self)> {
         if !self.has_episodes() {
             return vec![(None, self)];
@@ -83,7 +85,7 @@ pub struct LogGroupContents {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogChannel {
-    /// Name for `columns` in a study: its name, or its 0-based index.
+    /// Name to write under `columns` in a study: the name of the column, or its index from 0.
     pub name: String,
     /// Index of its group in `groups`.
     pub group: usize,
@@ -97,6 +99,7 @@ pub struct LogChannel {
     pub missing: u64,
     /// Smallest and largest value; null without values.
     pub range: Option<[f64; 2]>,
-    /// Means of up to 48 equal parts of the recording, in order; null for a part without values.
+    /// Course of the values for a small plot: means of up to 48 equal parts of the recording, in order; null for a part
+    /// without values.
     pub course: Vec<Option<f64>>,
 }

@@ -26,9 +26,9 @@ pub struct NewStudyFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Unsure {
-    /// The line in question; null if it is not a single line.
+    /// The line of the study to check; null if the doubt is not about a single line.
     pub line: Option<StudyChange>,
-    /// Alternatives proposed by the examination, which does not distinguish them from other mistakes.
+    /// Corrections proposed by `check`. Other mistakes could explain its findings equally well.
     pub proposed: Vec<StudyChange>,
     /// Reason for the doubt.
     pub reason: String,

@@ -11,23 +11,27 @@ use dynident_study::{Expected, StudyError};
 /// Thresholds of [`ResultFile::problems_of_the_model_with`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProblemSettings {
-    /// Torque error of the physically consistent model divided by that of the unconstrained estimate, same rows and all
-    /// joints, above which this is a problem. Default 1.5: real test logs have 0.8 to 1.14, dead torque channels 1.6.
+    /// Torque error of the physically consistent model divided by that of the unconstrained estimate (same rows, all
+    /// joints together). A larger ratio is a problem. Default 1.5: real test logs have 0.8 to 1.14, logs with a dead
+    /// torque channel 1.6.
     pub max_error_ratio: f64,
-    /// The same for a single joint. Default 2.5: real test logs have 0.6 to 1.7, dead torque channels 5.2.
+    /// Torque error of the physically consistent model divided by that of the unconstrained estimate, for a single
+    /// joint. A larger ratio is a problem. Default 2.5: real test logs have 0.6 to 1.7, logs with a dead torque channel
+    /// 5.2.
     pub max_joint_error_ratio: f64,
-    /// Unexplained torque of training or held-out logs, in percent of the torque, above which this is a problem.
-    /// Default 60.
+    /// Unexplained torque of training or held-out logs, percent of the torque. A larger value is a problem. Default 60.
     pub max_unexplained_percent: f64,
-    /// Residual of a held-out log divided by that of the training logs (root mean square over the joints), above which
-    /// this is a problem. Default 4: ten real data sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
+    /// Residual of a held-out log divided by that of the training logs (root mean square over the joints). A larger
+    /// ratio is a problem. Default 4: ten real data sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
     pub max_held_out_ratio: f64,
-    /// The same if `check` found an inconsistent joint torque. Default 2.
+    /// Limit of the same ratio as `max_held_out_ratio` if `check` found a joint torque that no physically consistent
+    /// model explains. Default 2.
     pub max_held_out_ratio_if_inconsistent: f64,
-    /// Unexplained torque of a held-out log below which its residual ratio is ignored, percent. Default 1.
+    /// Unexplained torque of a held-out log, percent. Below it, `max_held_out_ratio` is not applied to the log. Default
+    /// 1.
     pub min_held_out_percent: f64,
-    /// Range of every position (rad, m) in all training logs below which the robot is at rest. Default 0.01: motions of
-    /// the examples with real logs have ranges above 0.3.
+    /// Range of the positions, rad (m): if every joint's range in all training logs is smaller, the robot is treated as
+    /// at rest. Default 0.01: motions of the examples with real logs have ranges above 0.3.
     pub max_range_at_rest: f64,
     /// Smallest torque of a joint for the comparison of errors, relative to the largest joint torque. Default 1e-3:
     /// smaller torques are friction only.
@@ -88,14 +92,15 @@ impl ResultFile {
         problems
     }
 
-    /// Those of [`problems`](Self::problems) that are not findings of a single log, with default thresholds.
+    /// Problems among [`problems`](Self::problems) that do not concern a single log, with default thresholds.
     pub fn problems_of_the_model(&self) -> Vec<String> {
         self.problems_of_the_model_with(&ProblemSettings::default())
     }
 
-    /// Problems that are not findings of a single log: those of the study examination, an estimator that did not
-    /// converge, and a consistent set (which is exported) with clearly larger errors than the estimate. The errors are
-    /// those on held-out logs; without held-out logs those on the training rows, if the difference is significant.
+    /// Problems that do not concern a single log: problems that `check` found in the study, an estimator that did not
+    /// converge, and a physically consistent set (which is exported) with clearly larger errors than the unconstrained
+    /// estimate. Errors on held-out logs are compared. Without held-out logs, errors on the training rows are compared,
+    /// and only a significant difference is a problem.
     pub fn problems_of_the_model_with(&self, settings: &ProblemSettings) -> Vec<String> {
         let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
@@ -117,7 +122,8 @@ impl ResultFile {
         problems.extend(tested);
         problems.extend(self.inconsistent_torques(settings));
         problems.extend(self.validation.iter().filter_map(|log| self.overfit(log, settings)));
-        // On training rows the estimate always has the smaller error, so only a significant difference is a problem.
+        // On training rows the unconstrained estimate always has the smaller error, so only a significant difference is
+        // a problem.
         let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
         let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
         if let (true, Some(physical)) = (is_tested, &self.training.physical) {
@@ -213,7 +219,7 @@ impl ResultFile {
         of_training.or_else(|| self.validation.iter().find_map(tested))
     }
 
-    /// What to do about unexplained torque, by the result of `check`.
+    /// How to fix unexplained torque; depends on the result of `check`.
     fn advice(&self) -> &'static str {
         let Some(check) = &self.check else { return "run `dynident check`" };
         if check.problems().next().is_some() {
@@ -237,7 +243,8 @@ impl ResultFile {
         ))
     }
 
-    /// Inconsistent joint torques, if a held-out log also has a large error: each alone may have other reasons.
+    /// Joint torques that no physically consistent model explains, if a held-out log also has a large error. Either
+    /// finding alone may have other reasons.
     fn inconsistent_torques<'a>(&'a self, settings: &'a ProblemSettings) -> impl Iterator<Item = String> + 'a {
         let worst = self.validation.iter().filter_map(|log| self.held_out_ratio(log, settings)).fold(0.0, f64::max);
         let findings = self.check.iter().flat_map(|check| &check.findings);
@@ -247,16 +254,19 @@ impl ResultFile {
             .map(CheckFinding::sentence)
     }
 
-    /// Residual of a held-out log relative to the training logs, without the torque that friction at rest and the
-    /// low-pass of the positions explain ([`JointResiduals::rmse_in_motion_nm`]). `None` for a small held-out error.
+    /// Residual of a held-out log relative to the training logs. Torque that is explained by friction at rest and by
+    /// the low-pass of the positions is excluded ([`JointResiduals::rmse_in_motion_nm`]). `None` for a small held-out
+    /// error.
     fn held_out_ratio(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<f64> {
-        // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
+        // Both errors must use the same frequency band; in the band of the fit, only the unconstrained estimate has
+        // errors.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
         let (fitted, held_out) = match &log.in_fit_band {
             Some(report) => (&self.training.joints, report),
             None => (written(), log.physical.as_ref().unwrap_or(&log.model)),
         };
-        // The residuals are those of the estimate; results of older versions have none in motion.
+        // Residuals are stored for the unconstrained estimate only; results of older versions have none for joints in
+        // motion.
         let estimated = &log.in_fit_band.as_ref().unwrap_or(&log.model).joints;
         let in_motion = |joint: usize| {
             let residuals: &JointResiduals = log.residuals.get(joint)?;
@@ -282,11 +292,11 @@ impl ResultFile {
 
 struct Errors<'a> {
     relative_percent: Option<f64>,
-    /// Joint, root mean square error (Nm or N), relative error in percent.
+    /// For each joint its name, root mean square error (Nm or N) and relative error in percent.
     joints: Vec<(&'a str, f64, Option<f64>)>,
 }
 
-/// Message if the consistent set is clearly worse than the estimate on the same rows.
+/// Message if the physically consistent set has clearly larger errors than the unconstrained estimate on the same rows.
 fn worse_when_consistent(
     place: &str,
     free: &Errors<'_>,
@@ -314,7 +324,7 @@ fn worse_when_consistent(
     if let Some((_, free, held)) = worst {
         return Some(sentence(format!("{place}, joint `{}`", free.0), free.2, held.2));
     }
-    // All joints: on the same rows, the ratio of relative errors equals that of the root mean squares.
+    // Both errors are relative to the same torque, so their ratio equals the ratio of the root mean square errors.
     let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
     (ratio? > settings.max_error_ratio)
         .then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))

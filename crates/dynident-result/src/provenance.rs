@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Provenance {
-    /// Twelve hexadecimal digits that identify the fields below except the command; all files of one run have the same.
-    /// They are the first digits of the SHA-256 of the version, the study, and the hashes of all further inputs.
+    /// Twelve hexadecimal digits that identify all inputs of a run; all files of the run have the same digits. They are
+    /// the first digits of the SHA-256 of the version, the study, and the hashes of all further inputs, but not the
+    /// command.
     pub identity: String,
     /// Version of the program.
     pub version: String,

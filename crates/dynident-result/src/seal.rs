@@ -27,7 +27,8 @@ impl ResultFile {
     }
 }
 
-/// SHA-256 of a result's content, independent of layout, without keys that may differ between equal results.
+/// SHA-256 of a result's content, independent of the layout of the JSON text. Excludes keys that may differ between
+/// equal results.
 pub(super) fn content_sha256(result: &Value) -> String {
     let mut content = result.clone();
     if let Some(all) = content.as_object_mut() {
@@ -44,7 +45,7 @@ pub(super) fn content_sha256(result: &Value) -> String {
     })
 }
 
-/// The stored hash of a result.
+/// The hash that is stored in a result.
 pub(super) fn stated_sha256(result: &Value) -> Option<&str> {
     result.get("provenance")?.get("content_sha256")?.as_str()
 }

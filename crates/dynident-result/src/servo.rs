@@ -1,4 +1,4 @@
-//! Result of `identify` for logs of commands and positions.
+//! Result of `identify` for logs of commands and positions of servo drives.
 
 use crate::error::ResultFileError;
 use crate::provenance::Provenance;
@@ -10,7 +10,7 @@ use std::path::Path;
 /// Name and version of the schema of [`ServoFile`].
 pub const SERVO_SCHEMA: &str = "dynident/servo/1";
 
-/// Drives and bodies that turn commands into the measured motion.
+/// Drives and bodies, identified so that the simulated motion for the commands equals the measured motion.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoFile {
@@ -24,27 +24,27 @@ pub struct ServoFile {
     pub joints: Vec<String>,
     /// Whether each joint is rotary.
     pub rotary: Vec<bool>,
-    /// Time step of the simulation, s.
+    /// Time step of the simulation in the fit, s.
     pub step_s: f64,
-    /// Number of unknowns.
+    /// Number of unknown values in the fit.
     pub unknowns: usize,
-    /// Steps of the search.
+    /// Number of steps of the search.
     pub iterations: usize,
-    /// Whether the search settled. If not, values and error bars are not final.
+    /// Whether the search converged. If not, values and error bars are not final.
     pub settled: bool,
     /// The training logs.
     pub training: Vec<ServoLog>,
     /// The held-out logs.
     pub validation: Vec<ServoLog>,
-    /// The simulated motion of the first held-out log, for a comparison with other simulators: at most 1,500 samples.
+    /// Measured and simulated motion of the first held-out log, to check another simulator: at most 1,500 samples.
     pub motion: Option<ServoMotion>,
     /// The drive of each joint.
     pub drives: Vec<ServoDrive>,
     /// The moving bodies.
     pub bodies: Vec<ServoBody>,
-    /// The factor that positions do not contain.
+    /// The common factor of all torques, inertias and masses, which positions alone do not determine.
     pub scale: ServoScale,
-    /// The drives in each form of `dynident export`, with their errors; empty in results of older versions.
+    /// The drives in each export format of `dynident export`, with their errors; empty in results of older versions.
     #[serde(default)]
     pub forms: Vec<ServoForm>,
     /// Values that the motion did not determine, in words.
@@ -53,7 +53,7 @@ pub struct ServoFile {
     pub notes: Vec<String>,
     /// Reasons not to use the result, in words.
     pub problems: Vec<String>,
-    /// The files that the result comes from, program and command.
+    /// Input files, program version and command of the result.
     pub provenance: Option<Provenance>,
     /// Computing time, s.
     pub seconds: f64,
@@ -68,7 +68,7 @@ impl ServoFile {
         Self::parse(&read_result(path)?, path)
     }
 
-    /// The same from text; `path` is its name in messages.
+    /// Parses a result of `identify` for commands and positions from text; `path` is its name in messages.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -84,7 +84,7 @@ impl ServoFile {
         }
     }
 
-    /// The first list of a wrong length, or number that no drive has.
+    /// Message about the first list of a wrong length or the first impossible value of a drive.
     fn implausible(&self) -> Option<String> {
         let joints = self.joints.len();
         let errors = self.forms.iter().flat_map(|form| &form.logs);
@@ -112,7 +112,7 @@ impl ServoFile {
     }
 }
 
-/// A log, simulated from its first position without resets.
+/// Errors of one log. The simulation starts at the first measured position and is not reset later.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoLog {
@@ -124,12 +124,12 @@ pub struct ServoLog {
     pub duration_s: f64,
     /// Root mean square error of the simulated position of each joint, rad (m).
     pub errors: Vec<f64>,
-    /// Root mean square distance of the measured position from the command, rad (m): the error of a simulation that
-    /// takes the command for the motion.
+    /// Root mean square difference between measured position and command, rad (m): the error of a simulation in which
+    /// joints follow commands exactly.
     pub command_errors: Vec<f64>,
 }
 
-/// The motion of a log.
+/// Measured and simulated motion of a log.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoMotion {
@@ -151,19 +151,21 @@ pub struct ServoMotion {
 pub struct ServoDrive {
     /// Position gain, Nm/rad (N/m).
     pub stiffness: f64,
-    /// Torque per velocity, Nm s/rad (N s/m): gain of the velocity, viscous friction and back-EMF together.
+    /// Torque per velocity, Nm s/rad (N s/m): sum of the velocity gain of the controller, viscous friction and
+    /// back-EMF.
     pub damping: f64,
     /// Inertia of rotor and gear at the joint, kg m² (kg).
     pub armature: f64,
     /// Coulomb friction without load, Nm (N).
     pub coulomb: f64,
-    /// Friction per torque of weight and velocity.
+    /// Increase of friction per torque that the gear carries (weight and velocity-dependent torque of the arm), without
+    /// unit.
     pub load_friction: f64,
-    /// Friction at rest above that in motion, Nm (N).
+    /// Difference between friction at rest and friction in motion (Stribeck effect), Nm (N).
     pub stribeck: f64,
-    /// Velocity at which most of that is gone, rad/s (m/s).
+    /// Velocity at which most of the Stribeck effect has disappeared, rad/s (m/s).
     pub stribeck_speed: f64,
-    /// Largest torque, Nm (N); null without limit.
+    /// Largest torque of the position controller, Nm (N); null without limit.
     pub torque_limit: Option<f64>,
     /// Largest acceleration of the set point, rad/s² (m/s²); null without limit.
     #[serde(default)]
@@ -174,18 +176,19 @@ pub struct ServoDrive {
     /// Largest speed of the joint in the robot description, rad/s (m/s); null without limit.
     #[serde(default)]
     pub velocity_limit: Option<f64>,
-    /// Time from a command to its effect, s.
+    /// Delay from a command to its effect, s.
     pub delay_s: f64,
-    /// Time from a stamp to the measurement of the position, s.
+    /// Delay from a time stamp of the log to the measurement of the position, s.
     pub read_delay_s: f64,
     /// Position of the model minus the measured position, rad (m).
     pub zero: f64,
-    /// Mean torque of weight and velocity over the training logs, without sign, Nm (N).
+    /// Mean absolute torque of weight and velocity over the training logs, Nm (N).
     pub mean_load: f64,
-    /// Mean of the largest friction over the training logs, Nm (N): the one number of the written robot descriptions.
+    /// Mean of the friction limit over the training logs, Nm (N): the single friction number that exported robot
+    /// descriptions contain.
     #[serde(default)]
     pub mean_friction: f64,
-    /// Values with error bars.
+    /// Values of the drive with error bars.
     pub values: Vec<ServoNumber>,
 }
 
@@ -200,7 +203,7 @@ pub struct ServoBody {
     pub parameters: [f64; 10],
     /// Mass in the robot description, kg.
     pub nominal_mass_kg: f64,
-    /// Values with error bars.
+    /// Values of the body with error bars.
     pub values: Vec<ServoNumber>,
 }
 
@@ -210,30 +213,30 @@ pub struct ServoBody {
 pub struct ServoNumber {
     /// Name in words.
     pub name: String,
-    /// Unit; empty for a number without unit.
+    /// Unit; empty for a value without unit.
     pub unit: String,
     /// The value.
     pub value: f64,
     /// Half-width of the 95 % interval.
     pub half_width_95: f64,
-    /// Half-width of the 95 % interval if the scale were known.
+    /// Half-width of the 95 % interval if the common factor of torques, inertias and masses were known.
     pub half_width_95_at_scale: f64,
     /// Half-width of the 95 % interval before the fit.
     pub half_width_95_before: f64,
-    /// Whether the motion determines it: the interval is at most half of that before the fit.
+    /// Whether the motion determines the value: the interval is at most half as wide as before the fit.
     pub determined: bool,
 }
 
-/// The common factor of all torques, inertias and masses.
+/// The common factor of all torques, inertias and masses, which positions alone do not determine.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoScale {
-    /// Whether the logs determine it.
+    /// Whether the logs determine the factor.
     pub determined: bool,
     /// Total mass of the moving bodies, kg.
     pub mass_kg: f64,
     /// Half-width of the 95 % interval of the factor, percent.
     pub half_width_95_percent: f64,
-    /// The reason why it is determined, or the log that would determine it, in words.
+    /// Reason why the factor is determined, or the additional log that would determine it, in words.
     pub anchor: String,
 }

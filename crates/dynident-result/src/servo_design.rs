@@ -1,4 +1,4 @@
-//! Result of `design` for drives with a position controller.
+//! Result of `design` for servo drives with a position controller.
 
 use crate::provenance::Provenance;
 use dynident_excitation::check::LimitReport;
@@ -25,25 +25,27 @@ pub struct ServoDesignFile {
     pub rate_hz: f64,
     /// Seed of the random candidates.
     pub seed: u64,
-    /// Number of simulated candidates.
+    /// Number of simulated candidate motions.
     pub evaluations: usize,
-    /// Expected standard deviation of the simulation's error, rad (m).
+    /// Expected standard deviation of the difference between simulated and measured position, rad (m).
     pub expected_error: f64,
-    /// Time in which these errors are alike, s.
+    /// Time over which errors of the simulation are correlated, s.
     pub correlation_s: f64,
-    /// Whether the simulated motion keeps all limits.
+    /// Whether the simulated motion satisfies all limits.
     pub feasible: bool,
-    /// Use of each limit by the simulated motion.
+    /// Every limit, with the largest value of the simulated motion relative to it.
     pub limits: Vec<LimitReport>,
-    /// Assumed limits, in words.
+    /// Assumed limits that the study does not state, in words.
     pub assumed: Vec<String>,
     /// Possible violations that no limit covers, in words.
     pub not_checked: Vec<String>,
-    /// Logarithm of the determinant of information and priors.
+    /// Logarithm of the determinant of the information matrix, including priors.
     pub log_det: f64,
-    /// The same of a chirp of all joints with the same length, range, speed and highest frequency.
+    /// Logarithm of the same determinant for a chirp (sine of rising frequency) of all joints with the same length,
+    /// range, speed and highest frequency.
     pub chirp_log_det: f64,
-    /// Geometric mean over all values: expected error bar divided by that of the chirp, at a known scale.
+    /// Expected error bar divided by the expected error bar of the chirp, geometric mean over all values; the common
+    /// factor of torques, inertias and masses is assumed known.
     pub error_bars_to_chirp: f64,
     /// Expected values of the drive of each joint.
     pub drives: Vec<ServoForecast>,
@@ -53,19 +55,19 @@ pub struct ServoDesignFile {
     pub not_determined: Vec<String>,
     /// Remarks, in words.
     pub notes: Vec<String>,
-    /// The files that the result comes from, program and command.
+    /// Input files, program version and command of the result.
     pub provenance: Option<Provenance>,
     /// Computing time, s.
     pub seconds: f64,
 }
 
-/// Expected values of a joint or body.
+/// Expected error bars of a joint or body.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoForecast {
     /// Name of the joint or body.
     pub name: String,
-    /// Its values.
+    /// Values of the joint or body with expected error bars.
     pub values: Vec<ServoForecastValue>,
 }
 
@@ -81,12 +83,13 @@ pub struct ServoForecastValue {
     pub value: f64,
     /// Expected half-width of the 95 % interval.
     pub half_width_95: f64,
-    /// The same if the scale were known.
+    /// Expected half-width of the 95 % interval if the common factor of torques, inertias and masses were known.
     pub half_width_95_at_scale: f64,
-    /// The same before the fit.
+    /// Half-width of the 95 % interval before the fit.
     pub half_width_95_before: f64,
-    /// The same as `half_width_95_at_scale` for the chirp.
+    /// Expected half-width of the 95 % interval for the chirp instead of the designed motion, if the common factor were
+    /// known.
     pub half_width_95_chirp: f64,
-    /// Whether the motion will determine it: the interval is at most half of that before the fit.
+    /// Whether the motion will determine the value: the expected interval is at most half as wide as before the fit.
     pub determined: bool,
 }

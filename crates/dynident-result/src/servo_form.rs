@@ -1,25 +1,25 @@
-//! Losses of identified drives in files for simulators, and the error of the motion with them.
+//! Parts of identified servo drives that files for simulators cannot represent, and the resulting error of the motion.
 
 use serde::{Deserialize, Serialize};
 
-/// The drives in one form of `dynident export`, with the error of their simulated motion.
+/// Identified servo drives in one export format, with the error of the motion that is simulated with them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoForm {
-    /// The form: `isaac-lab-implicit`, `isaac-lab-delayed` or `mjcf`.
+    /// Export format: `isaac-lab-implicit`, `isaac-lab-delayed` or `mjcf`.
     pub form: String,
-    /// Time step of the simulation that gives the errors, s: the physics step of Isaac Lab.
+    /// Time step of the simulation for these errors, s: the physics step of Isaac Lab.
     pub step_s: f64,
-    /// Delay of each joint in steps; empty if the form has no delay, or a delay in seconds.
+    /// Delay of each joint in simulation steps; empty if the format has no delay, or states it in seconds.
     #[serde(default)]
     pub delay_steps: Vec<u32>,
-    /// Parts of the drives that are missing or represented by another law, in words.
+    /// Properties of the drives that the format lacks or represents by another law, in words.
     pub lost: Vec<String>,
     /// The errors on each log.
     pub logs: Vec<ServoFormLog>,
 }
 
-/// The error of a form on one log, simulated from its first position without resets.
+/// Error of an export format on one log. The simulation starts at the first measured position and is not reset later.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ServoFormLog {
@@ -29,12 +29,12 @@ pub struct ServoFormLog {
     pub held_out: bool,
     /// Root mean square error of the simulated position of each joint, rad (m); null if the simulation diverges.
     pub errors: Option<Vec<f64>>,
-    /// The same of the identified drives.
+    /// Root mean square position error of each joint with the identified drives, rad (m).
     pub model_errors: Vec<f64>,
 }
 
 impl ServoForm {
-    /// Losses and error in sentences, for these joints; `what` is the name of the form in a sentence.
+    /// Missing properties and errors in sentences, for these joints; `what` is the name of the format in a sentence.
     pub fn sentences(&self, what: &str, joints: &[String], rotary: &[bool]) -> Vec<String> {
         let mut all: Vec<String> = self.lost.iter().map(|lost| format!("{what}: {lost}.")).collect();
         let held_out = self.logs.iter().any(|log| log.held_out);
@@ -71,8 +71,9 @@ impl ServoForm {
         all
     }
 
-    /// Mean over joints and held-out logs (training logs without them) of the form's errors and of the identified
-    /// drives' errors, rad (m); `None` if a simulation diverges.
+    /// Mean position error with the exported drives, and mean position error with the identified drives, rad (m). Both
+    /// are means over joints and held-out logs, or training logs if there are no held-out logs. `None` if a simulation
+    /// diverges.
     pub fn mean_errors(&self) -> Option<[f64; 2]> {
         let held_out = self.logs.iter().any(|log| log.held_out);
         let logs = || self.logs.iter().filter(|log| log.held_out == held_out);

@@ -4,7 +4,7 @@ use super::provenance::Provenance;
 use dynident_iteration::RobotStatus;
 use serde::{Deserialize, Serialize};
 
-/// Schema of `truth.json`.
+/// Name and version of the schema of `truth.json`.
 pub const SIMULATION_SCHEMA: &str = "dynident/simulation/1";
 
 /// Content of `truth.json`.
@@ -22,7 +22,7 @@ pub struct SimulationFile {
     pub controller: String,
     /// Outcome of the run.
     pub status: RobotStatus,
-    /// Whether it reached the end of the trajectory.
+    /// Whether the run reached the end of the trajectory.
     pub done: bool,
     /// Names of the joints, in the order of the log's columns.
     pub joints: Vec<String>,
@@ -36,7 +36,7 @@ pub struct SimulationFile {
     pub saturated_samples: Vec<usize>,
     /// True bodies: ten parameters each.
     pub bodies: Vec<BodyTruth>,
-    /// True parameters of the terms.
+    /// True parameters of the friction and drive terms.
     #[serde(rename = "laws")]
     pub terms: Vec<ParameterTruth>,
     /// True base parameters.

@@ -4,15 +4,15 @@ use super::identification::{BodyResult, ResultFile};
 use dynident_model::InertialParameters;
 use dynident_model::urdf::MAX_MAGNITUDE;
 
-/// Largest base parameter: a mass times a squared length, each at most [`MAX_MAGNITUDE`].
+/// Largest accepted base parameter: a mass times a squared length, each at most [`MAX_MAGNITUDE`].
 const MAX_BASE_PARAMETER: f64 = MAX_MAGNITUDE * MAX_MAGNITUDE * MAX_MAGNITUDE;
 
-/// Relative tolerance for redundant numbers of a body, which may differ by rounding of a quotient.
+/// Relative tolerance for numbers of a body that can be computed from others; the quotient may be rounded.
 const MAX_RELATIVE_ROUNDING: f64 = 1e-9;
 
 impl ResultFile {
-    /// Checks list lengths, magnitudes, redundant numbers of bodies, and physical consistency if `physical.consistent`
-    /// is true.
+    /// Checks list lengths, magnitudes, agreement of redundant numbers of bodies, and physical consistency if
+    /// `physical.consistent` is true.
     ///
     /// # Errors
     /// The problem, with its place and the fix.

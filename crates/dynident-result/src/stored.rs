@@ -30,7 +30,7 @@ pub fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, ResultFileError>
     part_of(&bytes, path, Edits::Refused)
 }
 
-/// As [`read_part`], from the text of a result.
+/// As [`read_part`], but reads from the text of a result.
 fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Result<T, ResultFileError> {
     let wrong = |message: String| ResultFileError::Content { path: path.to_owned(), message };
     let schema = schema_of(bytes, path)?;
@@ -116,17 +116,17 @@ impl ResultFile {
         study
     }
 
-    /// Cut-off of the motion, Hz.
+    /// Cut-off of the low-pass on the positions, Hz.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.method.motion.differentiator.cutoff_hz()
     }
 
-    /// Cut-off of the band of held-out figures, if it differs from that of the fit, Hz.
+    /// Cut-off of the frequency band of held-out errors, Hz, if it differs from the cut-off of the fit.
     pub fn motion_hz(&self) -> Option<f64> {
         self.method.motion_hz
     }
 
-    /// The base parameters, which must match those of `model`.
+    /// The base parameters of the result, which must be the base parameters of `model`.
     ///
     /// # Errors
     /// Different base parameters, or values that are not finite.
@@ -158,7 +158,8 @@ impl ResultFile {
         Ok(values)
     }
 
-    /// Checks that declared torques have the same functions as in the result; equal symbols do not guarantee this.
+    /// Checks that torques declared by `[[torque]]` have the same functions as in the result; equal symbols alone do
+    /// not guarantee this.
     fn require_laws(&self, path: &Path, model: &ParametricModel) -> Result<(), ResultFileError> {
         for term in model.terms() {
             let (Some(function), symbol) = (term.state_function(), term.symbol()) else { continue };
@@ -188,7 +189,7 @@ impl ResultFile {
         Ok(values)
     }
 
-    /// The model with its load parameters and gains.
+    /// The model with the parameters of load-dependent friction and the torque gains of this result.
     ///
     /// # Errors
     /// Load parameters or gains that do not match `model`.
@@ -230,7 +231,7 @@ impl ResultFile {
         KnownArm::new(values, covariance, refit, self.cutoff_hz()).map_err(|error| wrong(&error.to_string()))
     }
 
-    /// Contributions of payloads to the base parameters.
+    /// Changes of the base parameters by the payloads of the study.
     ///
     /// # Errors
     /// Payloads that do not match `model`, or an unknown payload of a log.
@@ -264,7 +265,7 @@ impl ResultFile {
     }
 }
 
-/// Contributions of payloads to the base parameters: identified and known ones.
+/// Changes of the base parameters by payloads, identified and known ones.
 pub struct StoredPayloads {
     added: Vec<(String, Vec<f64>)>,
 }

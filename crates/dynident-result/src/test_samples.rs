@@ -1,4 +1,4 @@
-//! Description of the samples that `validate --samples` writes.
+//! Tables of samples that `validate --samples` writes, for comparison with other programs.
 
 use dynident_identification::Role;
 use dynident_recording::DecimationSettings;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`TestSamplesFile`].
 pub const TEST_SAMPLES_SCHEMA: &str = "dynident/test-samples/1";
 
-/// The tables of a folder of samples, `samples.json` next to them.
+/// Content of `samples.json`, which describes the tables of samples in the same folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TestSamplesFile {
@@ -19,24 +19,24 @@ pub struct TestSamplesFile {
     pub logs: Vec<TestedLog>,
 }
 
-/// The samples of a log and the filter before its errors.
+/// Table of samples of a log, and the filter that is applied before errors are computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TestedLog {
     /// Name of the log, as in the result and in `NAME.validation.json`.
     pub log: String,
-    /// Its role.
+    /// Role of the log.
     pub role: Role,
-    /// Name of its table.
+    /// Name of the log's table.
     pub file: String,
     /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// Low-pass and decimation of measured and predicted torque; null if every sample is compared. A held-out log has
-    /// the filter of its test, a training log that of the fit.
+    /// Low-pass and decimation of measured and predicted torque before they are compared; null if every sample is
+    /// compared. A held-out log has the filter of its test, a training log the filter of the fit.
     pub filter: Option<DecimationSettings>,
-    /// Coefficients of this low-pass. Row k of a segment is the sum of these coefficients times the samples from
-    /// `k factor` on, with samples that are not `used` set to zero, divided by the sum of the coefficients of the used
-    /// samples; rows where this sum is below one half are not compared.
+    /// Coefficients of this low-pass filter. Filtered row k of a segment is a weighted sum of the samples from index
+    /// `k factor` on. Samples that are not `used` are set to zero, and the sum is divided by the sum of the
+    /// coefficients of the used samples. Rows for which the latter is below one half are not compared.
     pub taps: Vec<f64>,
 }
 

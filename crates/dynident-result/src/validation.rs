@@ -15,12 +15,12 @@ pub struct ValidationFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// Figures per log.
+    /// Errors on each log.
     pub validation: Vec<LogValidation>,
     /// Import findings.
     pub logs: Vec<LogSummary>,
-    /// Reasons against the figures: training logs, problems of the logs. If there are any, the command exits with
-    /// status 1.
+    /// Reasons not to trust the errors: tested logs that were used for the fit, problems of the logs. If there are any,
+    /// the command exits with status 1.
     #[serde(default)]
     pub problems: Vec<String>,
 }

@@ -9,18 +9,19 @@ use dynident_recording::filter::CutoffChoice;
 use dynident_recording::{FilterError, MotionSettings};
 use std::sync::{Arc, OnceLock};
 
-/// Maximum lag that a study can state, in seconds for an arm of usual size. Large enough for two recorders that were
-/// started by hand; small enough to reject milliseconds given as seconds.
+/// Maximum lag that a study can state, s, for an arm of usual size. It permits two recorders that were started by hand,
+/// but rejects milliseconds that were written as seconds.
 const MAX_STATED_LAG_S: f64 = 2.5;
 
-/// Rows above which the row count of a log is estimated, not counted.
+/// Number of rows above which the row count of a log is estimated instead of counted.
 const MAX_COUNTED_ROWS: u64 = 200_000;
-/// Maximum number of rows of a joint above the motion's band, over all recordings.
+/// Maximum number of rows of one joint, over all recordings, in passes with torque above the frequency band of the
+/// motion.
 const MAX_ROWS_ABOVE_MOTION_BAND: f64 = 20_000.0;
 /// Ratio of torque cut-off to motion cut-off if the rate of the recordings is unknown.
 const DEFAULT_TORQUE_BAND_RATIO: f64 = 8.0;
 
-/// Cut-off and noise that the position spectra of one log show.
+/// Cut-off and noise of one log, from the spectra of its positions.
 #[derive(Clone, Debug)]
 pub struct LogSpectrum {
     /// Index of the recording.
@@ -42,7 +43,8 @@ pub struct RowSettings<'a> {
     pub parallel_filter: &'a ParallelFilterSettings,
 }
 
-/// Recordings of a task and the filters in use. Each log that fits into memory is read and differentiated only once.
+/// Recordings of a task with the filters that are applied to them. Each log that fits into memory is read and
+/// differentiated only once.
 #[derive(Clone, Debug)]
 pub struct Logs<'a> {
     /// All recordings of any role.
@@ -53,21 +55,21 @@ pub struct Logs<'a> {
     pub filter: ParallelFilterSettings,
     /// Threads and progress of the job.
     pub execution: Execution<'a>,
-    /// Empty if passes store nothing.
+    /// Stored motion of each recording; empty if passes store nothing.
     kept: Arc<Vec<OnceLock<KeptLog>>>,
-    /// The same recordings with excerpts of the long ones; empty without excerpts.
+    /// All recordings, with excerpts in place of long ones; empty without excerpts.
     excerpts: Arc<Vec<Recording>>,
-    /// Spectra of the deciding logs if the cut-off is automatic.
+    /// Spectra of the logs that decide on an automatic cut-off.
     spectra: Vec<LogSpectrum>,
-    /// Cut-off of the torque's motion band if the fit uses another one, hertz.
+    /// Cut-off from the spectrum of the motion, hertz, if the fit uses another one.
     motion_hz: Option<f64>,
-    /// Cut-off that the parallel filter follows if it is not that of the motion, hertz.
+    /// Cut-off from which the parallel filter is derived, hertz; `None` for the cut-off of the motion.
     torque_hz: Option<f64>,
 }
 
 impl<'a> Logs<'a> {
-    /// Selects one cut-off for all logs: the stated one, that of a finished model, or the highest that the spectra of
-    /// the logs `deciding` suggest. A model and its test must use the same filters.
+    /// Selects one cut-off for all logs: the cut-off in the settings, that of a finished model, or the highest that the
+    /// spectra of the logs `deciding` suggest. A model and its test must use the same filters.
     ///
     /// # Errors
     /// A log cannot be read, or a stated lag is too long for a robot of this size.
@@ -116,7 +118,7 @@ impl<'a> Logs<'a> {
         Ok(Self { recordings, motion, filter, execution, kept, excerpts, spectra, motion_hz: None, torque_hz: None })
     }
 
-    /// Replaces the cut-off if it is automatic. Held-out figures keep the band of the previous cut-off.
+    /// Replaces the cut-off if it is automatic. Held-out errors still use the frequency band of the previous cut-off.
     #[must_use]
     pub fn with_cutoff(mut self, settings: &MotionSettings, cutoff_hz: f64) -> Self {
         let motion_hz = self.motion_hz.or_else(|| motion_band_hz(&self.motion));
@@ -138,7 +140,7 @@ impl<'a> Logs<'a> {
         }
     }
 
-    /// The same filters for other recordings, for example with fewer rows.
+    /// Applies the same filters to other recordings, for example recordings with fewer rows.
     #[must_use]
     pub fn with_recordings<'b>(&self, recordings: &'b [Recording]) -> Logs<'b>
     where
@@ -157,7 +159,7 @@ impl<'a> Logs<'a> {
         self
     }
 
-    /// Adds [excerpts](crate::excerpts) for [passes over selected instants](Self::pass_for_instants).
+    /// Adds [excerpts](crate::excerpts) for [passes that need only some instants](Self::pass_for_instants).
     #[must_use]
     pub fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
         self.excerpts = excerpts;
@@ -169,23 +171,23 @@ impl<'a> Logs<'a> {
         Arc::clone(&self.excerpts)
     }
 
-    /// Makes every pass read again: slower, but memory does not grow with the length of a log.
+    /// Makes every pass read the files again. This is slower, but the memory does not grow with the length of a log.
     #[must_use]
     pub fn without_keeping(mut self) -> Self {
         self.kept = Arc::default();
         self
     }
 
-    /// Sets the motion cut-off whose band the held-out figures use, hertz; `None` for that of the fit.
+    /// Sets the cut-off of the frequency band of held-out errors, hertz; `None` for the cut-off of the fit.
     #[must_use]
     pub fn with_motion_band(mut self, motion_hz: Option<f64>) -> Self {
         self.motion_hz = motion_hz;
         self
     }
 
-    /// Adds torque above the motion's band, with as many rows as a pass handles within a second. The parallel filter
-    /// normally follows the motion's cut-off, but most of the information on the width of a friction step
-    /// (milliseconds) lies above it.
+    /// Raises the cut-off of the parallel filter, with as many rows as a pass handles within a second. The filter
+    /// normally removes torque above the frequency band of the motion. But friction changes within milliseconds at a
+    /// reversal, so most of the information about this change is above that band.
     ///
     /// # Errors
     /// A recording cannot be read.
@@ -197,12 +199,12 @@ impl<'a> Logs<'a> {
             rows += self.rows_of(model, log.index)? * share;
         }
         let times = if rows > 0.0 { (MAX_ROWS_ABOVE_MOTION_BAND / rows).max(1.0) } else { DEFAULT_TORQUE_BAND_RATIO };
-        // Powers of two, because the rows of a long text file are only estimated.
+        // Powers of two, because the number of rows of a long text file is only an estimate.
         let times = times.log2().floor().exp2();
         Ok(Self { torque_hz: Some(times * motion_hz), ..self.clone() })
     }
 
-    /// Counts the rows of a recording, which stores its motion for the next pass; estimates those of a long log.
+    /// Counts the rows of a recording, and stores its motion for the next pass; estimates the number for a long log.
     fn rows_of(&self, model: &RegressorModel, index: usize) -> Result<f64, LogError> {
         let estimated = self.recordings[index].estimated_rows();
         if let Some(estimated) = estimated.filter(|rows| *rows > MAX_COUNTED_ROWS) {
@@ -217,12 +219,13 @@ impl<'a> Logs<'a> {
         Ok(rows as f64)
     }
 
-    /// Cut-off that the spectra suggest, hertz; `None` if the fit uses it.
+    /// Cut-off from the spectra of the motion, hertz; `None` if the fit uses this cut-off.
     pub fn motion_hz(&self) -> Option<f64> {
         self.motion_hz
     }
 
-    /// Cut-off that the spectra suggest, hertz, if cut-off and parallel filter are both automatic.
+    /// Cut-off from the spectra of the motion, hertz, if the settings leave both this cut-off and the parallel filter
+    /// automatic.
     pub fn automatic_cutoff_hz(&self) -> Option<f64> {
         let filter = &self.filter;
         let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
@@ -230,7 +233,7 @@ impl<'a> Logs<'a> {
         motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())
     }
 
-    /// Spectra of the deciding logs; empty if the cut-off was stated.
+    /// Spectra of the logs that decided on the cut-off; empty if the settings state the cut-off.
     pub fn spectra(&self) -> &[LogSpectrum] {
         &self.spectra
     }
@@ -256,7 +259,7 @@ impl<'a> Logs<'a> {
     }
 
     /// A pass that needs only some instants of recording `index`. It reads the excerpt, if there is one and the motion
-    /// is not stored, so that a long log is not read again.
+    /// is not in memory, so that a long log is not read again.
     pub fn pass_for_instants<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
         let pass = self.pass(model, index);
         let is_kept = pass.kept.is_some_and(|kept| kept.get().is_some());
@@ -266,13 +269,13 @@ impl<'a> Logs<'a> {
         }
     }
 
-    /// Begins a stage over some recordings.
+    /// Reports the beginning of a stage that processes these recordings.
     pub fn begin(&self, stage: &str, indices: &[usize]) {
         let rows = indices.iter().map(|&index| self.recordings[index].estimated_rows()).sum();
         self.execution.progress.begin(stage, rows);
     }
 
-    /// Ends the stage.
+    /// Reports the end of the stage.
     pub fn end(&self) {
         self.execution.progress.end();
     }

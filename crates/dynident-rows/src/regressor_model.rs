@@ -4,18 +4,19 @@ use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{InertialParameters, Model};
 
-/// Regrouping factors below this value are rounding errors.
+/// Factors in the expressions of base parameters that are smaller than this value are rounding errors.
 const MIN_REGROUPING_FACTOR: f64 = 1e-9;
 
-/// A parametric model with results of earlier estimates: the load for load-dependent friction, and torque gains.
+/// A parametric model with results of earlier estimates: the bodies whose torque is the load in load-dependent
+/// friction, and torque gains.
 #[derive(Clone, Debug)]
 pub struct RegressorModel {
     /// Model, torque terms, base parameters and layout.
     pub parametric: ParametricModel,
-    /// Bodies of an earlier estimate for load-dependent friction, one value per column of the layout. Without them such
-    /// friction has a column of zeros.
+    /// Bodies of an earlier estimate, one value per column of the layout. Their torque is the load in load-dependent
+    /// friction; without them, the columns of such friction are zero.
     pub load_parameters: Option<Vec<f64>>,
-    /// Estimated factor on the logged torque of each joint; empty if no gain was estimated.
+    /// Estimated factor on the logged torque of each joint; empty if no factor was estimated.
     pub torque_gains: Vec<f64>,
 }
 
@@ -56,8 +57,8 @@ impl RegressorModel {
         self.parametric.joint_names()
     }
 
-    /// Appends further terms to the base columns, dependent or not, so that terms can be selected from one set of
-    /// factors.
+    /// Appends further terms to the base columns, linearly dependent or not. Different sets of terms can then be
+    /// compared with one set of triangular factors.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut wide = self.clone();
@@ -69,7 +70,8 @@ impl RegressorModel {
         wide
     }
 
-    /// Sets the load from an estimate of `other`, without drive inertia, if load-dependent friction needs it.
+    /// Sets the bodies for load-dependent friction, if there is any, from an estimate of the model `other`. Drive
+    /// inertia is subtracted from the bodies.
     #[must_use]
     pub fn with_load_of_estimate(self, other: &Self, values: &[f64]) -> Self {
         if self.needs_load() { self.with_load_of(other, &other.without_drives(values)) } else { self }
@@ -77,9 +79,10 @@ impl RegressorModel {
 
     /// Removes drive inertia from the base parameters of bodies.
     ///
-    /// Drive inertia of the first joints is not distinguishable from that of their bodies (`Izz1 + Ia1`), but does not
-    /// load the gear. The part above the robot description's value, at most the whole, is attributed to the drive.
-    /// Without a robot description all is attributed to the bodies.
+    /// The drive inertia of the first joints is only identifiable in a sum with the inertia of their bodies
+    /// (`Izz1 + Ia1`), but it does not load the gear. The part of the sum that exceeds the body's value in the robot
+    /// description (at most the whole sum) is attributed to the drive. Without a robot description the whole sum is
+    /// attributed to the body.
     fn without_drives(&self, values: &[f64]) -> Vec<f64> {
         let mut bodies = values.to_vec();
         let (base, terms) = (self.base(), self.terms().len());
@@ -104,7 +107,7 @@ impl RegressorModel {
         bodies
     }
 
-    /// Sets the load from the bodies of an estimate of `other`, if load-dependent friction needs it.
+    /// Sets the bodies for load-dependent friction, if there is any, from an estimate of the model `other`.
     #[must_use]
     pub fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
         if self.needs_load() {
@@ -115,8 +118,9 @@ impl RegressorModel {
         self
     }
 
-    /// Inertial parameters whose rigid-body torque is the load of load-dependent friction: the load parameters at the
-    /// places of their columns. They are not those of physically consistent bodies. `None` without load parameters.
+    /// Inertial parameters of bodies whose rigid-body torque is the load in load-dependent friction: the load
+    /// parameters at the places of their columns. The bodies need not be physically consistent. `None` without load
+    /// parameters.
     pub fn load_bodies(&self) -> Option<Vec<InertialParameters>> {
         let parameters = self.load_parameters.as_ref()?;
         let mut bodies = vec![InertialParameters::ZERO; self.model().body_count()];
@@ -128,7 +132,7 @@ impl RegressorModel {
         Some(bodies)
     }
 
-    /// Whether some friction depends on the joint load.
+    /// Whether some friction depends on the torque that the joint carries.
     pub fn needs_load(&self) -> bool {
         self.layout().columns().iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()))
     }

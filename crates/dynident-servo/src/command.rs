@@ -1,9 +1,9 @@
-//! The set point of a drive: the command held between stamps, or a profile that follows it.
+//! Set point of a drive over time: the command, held between time stamps, or a motion profile that follows the command.
 
 use crate::drive::Drive;
 use crate::profile::{Profile, profile};
 
-/// Commands of one joint at rising times, each held until the next.
+/// Commands of one joint at increasing times; each command is held until the next.
 #[derive(Debug)]
 pub(crate) struct HeldCommand<'a> {
     times_s: &'a [f64],
@@ -17,8 +17,9 @@ impl<'a> HeldCommand<'a> {
         Self { times_s, values, at: 0 }
     }
 
-    /// Mean command over `start_s` to `end_s`, exact for held values, and its derivative by a shift of both times.
-    /// Before the first stamp the first command holds. Calls must have rising times.
+    /// Mean command from `start_s` to `end_s` (exact, because commands are piecewise constant), and its derivative by a
+    /// shift of both times. The first command also applies before its time stamp. The times of successive calls must
+    /// increase.
     pub(crate) fn mean(&mut self, start_s: f64, end_s: f64) -> (f64, f64) {
         while self.at + 1 < self.times_s.len() && self.times_s[self.at + 1] <= start_s {
             self.at += 1;
@@ -36,8 +37,8 @@ impl<'a> HeldCommand<'a> {
     }
 }
 
-/// Relative change of a limit for the derivative of a profile: a central difference over less has the errors of the
-/// profile's steps.
+/// Relative change of a limit for the central difference that gives the derivative of a profile. With a smaller change,
+/// the discrete steps of the profile cause errors.
 const LIMIT_CHANGE: f64 = 0.01;
 
 /// The set point of one joint during a run.
@@ -49,22 +50,23 @@ pub(crate) enum SetPoint<'a> {
     Profile(Box<ProfileSetPoint>),
 }
 
-/// A profile, and its derivatives by the logarithms of acceleration and speed where they are finite and needed.
+/// A motion profile, and its derivatives by the logarithms of the limits of acceleration and speed, where a limit is
+/// finite and its derivative is needed.
 #[derive(Debug)]
 pub(crate) struct ProfileSetPoint {
     own: Profile,
-    /// The profiles with a larger and a smaller limit.
+    /// For each limit, the profiles with a larger and with a smaller limit.
     by_log: [Option<[Profile; 2]>; 2],
 }
 
-/// Mean of the set point over one step, with its derivatives.
+/// Mean set point of one time step, with its derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StepCommand {
-    /// The mean, rad (m).
+    /// Mean set point, rad (m).
     pub(crate) mean: f64,
-    /// Derivative by a shift of the times.
+    /// Derivative of the mean set point by a shift of the times.
     pub(crate) rate: f64,
-    /// Derivatives by the logarithm of the acceleration and of the speed of the profile.
+    /// Derivatives of the mean set point by the logarithms of the profile's limits of acceleration and of speed.
     pub(crate) by_log: [f64; 2],
 }
 
@@ -88,7 +90,7 @@ impl<'a> SetPoint<'a> {
         }))
     }
 
-    /// The set point from `start_s` to `end_s`. Calls must have rising times.
+    /// Set point from `start_s` to `end_s`. The times of successive calls must increase.
     pub(crate) fn during(&mut self, start_s: f64, end_s: f64) -> StepCommand {
         match self {
             Self::Held(command) => {

@@ -1,9 +1,9 @@
-//! Why a fit cannot begin or cannot end.
+//! Errors of a fit to commands and positions.
 
 use dynident_model::ModelError;
 use thiserror::Error;
 
-/// Why a fit cannot begin or cannot end.
+/// Reason why a fit cannot begin or cannot end.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ServoError {
@@ -23,7 +23,7 @@ pub enum ServoError {
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// Least permitted value.
+        /// Smallest permitted value.
         least: f64,
         /// Largest permitted value.
         most: f64,
@@ -51,8 +51,8 @@ pub enum ServoError {
         #[source]
         fault: RunFault,
     },
-    /// With the start values, the simulated robot has no finite motion. State rough values of the drives in the study,
-    /// and check the masses in the robot description.
+    /// With the first values of the search, the simulated motion diverges. State rough values of the drives in the
+    /// study, and check the masses in the robot description.
     #[error("the simulation of {run} fails with the first values: state stiffness, damping and armature of the drives")]
     Start {
         /// Name of the run.
@@ -63,7 +63,7 @@ pub enum ServoError {
     Model(#[from] ModelError),
 }
 
-/// What is wrong with a run.
+/// Reason why a run cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RunFault {

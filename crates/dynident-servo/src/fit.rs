@@ -1,11 +1,13 @@
-//! The coordinates whose simulated motion is most like the measured one.
+//! Search for the values of drives and bodies whose simulated motion is most similar to the measured motion.
 //!
-//! The cost is minus twice the logarithm of the likelihood of all joints (`likelihood.rs`) and of the priors,
-//! `Σ (z / sd)²`. Levenberg and Marquardt's method decreases the cost, with exact derivatives of the simulation.
+//! Each unknown is described by a coordinate `z`, which is zero for the nominal value and has the prior standard
+//! deviation `sd`. The cost is minus twice the logarithm of the likelihood of all joints (`likelihood.rs`) plus the
+//! priors, `Σ (z / sd)²`. The method of Levenberg and Marquardt minimises the cost, with exact derivatives of the
+//! simulation.
 //!
-//! The search begins at the given coordinates and at those of the joints' responses (`start.rs`). From each it descends
-//! with long time steps and short simulations that restart from the measured motion, which leave few local minima, then
-//! without restarts. The better end is refined with accurate time steps.
+//! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). From each
+//! start, it first minimises with long time steps and short simulations that restart from the measured motion, which
+//! have few local minima, and then without restarts. The best result is refined with accurate time steps.
 
 use crate::error::ServoError;
 use crate::law::DriveLaw;
@@ -19,60 +21,63 @@ use crate::step_state::Stepping;
 use crate::unknowns::unknowns;
 use nalgebra::{DMatrix, DVector};
 
-/// The first stages simulate with steps this many times longer.
+/// Ratio of the time step in the first stages of the search to that of the settings.
 const COARSE: f64 = 4.0;
-/// Time between restarts in the first stage, s: longer than the response of a servo.
+/// Time between restarts of the simulation in the first stage, s: longer than the response of a servo.
 const RESTART_S: f64 = 0.5;
-/// Largest difference of coordinates of starts that are treated as one.
+/// Maximum difference between the coordinates of two starts that are treated as the same start.
 const SAME_START: f64 = 1e-3;
-/// Most steps of each of the first stages.
+/// Maximum number of steps in each of the first stages.
 const ROUGH_ITERATIONS: usize = 15;
-/// The first stages end when the cost falls by less than this.
+/// Decrease of the cost in one step below which the first stages end.
 const ROUGH_TOLERANCE: f64 = 1.0;
-/// Most periods of all runs together, which need memory for a matrix each.
+/// Maximum number of periods of all runs together; each needs memory for a matrix.
 const MOST_PERIODS: f64 = 500.0;
-/// First value of the number of neighbouring samples with the same error.
+/// Initial value of the number of neighbouring samples whose errors are equal.
 const FIRST_CORRELATED: f64 = 25.0;
-/// A period with a smaller weight is reported as not explained: its error is at least five times the usual one.
+/// Weight of a period in the fit below which it is reported as unexplained; its error is then at least five times the
+/// usual error.
 const UNEXPLAINED_WEIGHT: f64 = 0.05;
-/// Longest change of the logarithm of a value in one step; other coordinates change at most by their prior deviation.
+/// Maximum change of the logarithm of a value in one step. Other coordinates change at most by their prior standard
+/// deviation.
 const LONGEST_STEP: f64 = 1.0;
-/// Most attempts to find a shorter step that decreases the cost.
+/// Maximum number of attempts to find a shorter step that decreases the cost.
 const ATTEMPTS: usize = 12;
 
-/// The end of a search.
+/// Result of a search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// Coordinates of the unknowns.
+    /// Coordinate of each unknown: the change from its nominal value.
     pub coordinates: Vec<f64>,
-    /// Their covariance by a jackknife over periods: robust to errors of the model that last shorter than a period.
+    /// Covariance of the coordinates, by a jackknife over time periods. It is valid if errors of the model are
+    /// correlated for less than a period.
     pub covariance: DMatrix<f64>,
-    /// Information of the data alone: the Hessian of half of the cost without the priors.
+    /// Information matrix of the data alone: the Hessian of half of the cost, without the priors.
     pub information: DMatrix<f64>,
     /// Cost, in units of minus twice the log-likelihood.
     pub cost: f64,
     /// Root mean square error of each joint over all runs, rad (m).
     pub errors: Vec<f64>,
-    /// Intervals that the model does not explain. They have little weight in the fit.
+    /// Time intervals that the model does not explain. They have little weight in the fit.
     pub unexplained: Vec<Unexplained>,
-    /// Number of steps.
+    /// Number of steps of the search.
     pub iterations: usize,
     /// Whether the last step changed the cost by less than the tolerance.
     pub settled: bool,
 }
 
-/// An interval in which the error of a joint is much larger than elsewhere.
+/// A time interval in which the error of a joint is much larger than elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unexplained {
     /// Index of the run.
     pub run: usize,
     /// The joint.
     pub joint: usize,
-    /// Begin and end, s, in stamps of the run.
+    /// Start and end, s, as time stamps of the run.
     pub interval_s: [f64; 2],
 }
 
-/// Likelihood and cost at some coordinates.
+/// Likelihood and cost at one set of coordinates.
 struct Point {
     joints: Vec<JointLikelihood>,
     cost: f64,
@@ -86,9 +91,9 @@ struct Searcher<'a> {
     settings: &'a ServoSettings,
     periods: Periods,
     stepping: Stepping,
-    /// Decrease of the cost at which a descent ends.
+    /// Decrease of the cost in one step below which a descent ends.
     tolerance: f64,
-    /// Number of neighbouring samples with the same error, for each joint.
+    /// Number of neighbouring samples with equal errors, for each joint.
     correlated: Vec<f64>,
 }
 
@@ -104,7 +109,7 @@ impl Searcher<'_> {
         cost.is_finite().then_some(Point { joints, cost })
     }
 
-    /// Sums of each period with the weights of a point.
+    /// Sums over each period, with the weights of a point.
     fn sums(&self, z: &[f64], point: &Point) -> Option<Vec<PeriodSums>> {
         let varied = VariedRobot::new(self.nominal, self.parameters, z).ok()?;
         let weights: Vec<Vec<f64>> = point.joints.iter().map(|own| own.weights.clone()).collect();
@@ -119,7 +124,8 @@ impl Searcher<'_> {
         matrix
     }
 
-    /// Steps until the cost settles. Returns the number of steps and whether it did.
+    /// Makes steps until the cost converges, at most `most`. Returns the number of steps and whether the cost
+    /// converged.
     fn descend(&self, z: &mut Vec<f64>, now: &mut Point, most: usize) -> (usize, bool) {
         let mut damping = 1e-3;
         for iteration in 1..=most {
@@ -142,7 +148,7 @@ impl Searcher<'_> {
         (most, false)
     }
 
-    /// Coordinates with a lower cost; `None` if no step decreases it by more than the tolerance.
+    /// Coordinates with a lower cost; `None` if no step decreases the cost by more than the tolerance.
     fn lower(
         &self,
         z: &[f64],
@@ -178,15 +184,15 @@ impl Searcher<'_> {
         None
     }
 
-    /// Number of neighbouring samples with the same error, for each joint: the variance of the periods' moments over
-    /// that of independent samples, median over the coordinates.
+    /// Number of neighbouring samples with equal errors, for each joint: the variance of the moments `Σ w g e` of the
+    /// periods, divided by the variance for independent samples; median over the coordinates.
     fn correlated(&self, sums: &[PeriodSums]) -> Vec<f64> {
         let of_joint = |(joint, now): (usize, &f64)| {
             let mut ratios: Vec<f64> = (0..self.parameters.len())
                 .filter_map(|k| {
                     let expected: f64 = sums.iter().map(|own| own.diagonals[joint][k]).sum();
                     let together: f64 = sums.iter().map(|own| own.moments[joint][k].powi(2)).sum();
-                    // The moments have the weights 1 / (variance × correlated).
+                    // The moments were computed with the weights 1 / (variance × correlated).
                     (expected > 0.0).then(|| now * together / expected)
                 })
                 .collect();
@@ -196,9 +202,10 @@ impl Searcher<'_> {
         self.correlated.iter().enumerate().map(of_joint).collect()
     }
 
-    /// Covariance of the coordinates: from the priors, and from the changes `(H - G)⁻¹ s` without one of the periods,
-    /// which has the information `G` and the moments `s` (jackknife over clusters: MacKinnon and White 1985; Bell and
-    /// McCaffrey 2002). The moments alone (White 1980) are too small if one period determines much of a coordinate.
+    /// Covariance of the coordinates, from the priors and a jackknife over periods (MacKinnon and White 1985; Bell and
+    /// McCaffrey 2002). Without a period that has the information `G` and the moments `s`, the coordinates change by
+    /// `(H - G)⁻¹ s`, where `H` is the Hessian. A covariance from the moments alone (White 1980) is too small if one
+    /// period determines much of a coordinate.
     fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let columns = self.parameters.len();
         let hessian = self.with_priors(gram);
@@ -225,8 +232,8 @@ impl Searcher<'_> {
         Some(covariance)
     }
 
-    /// Coordinates of the best robot whose drives are nearly equal, and the iterations to find it. With separate values
-    /// for each joint the search has more local minima; equal drives are a start that leads past most of them.
+    /// Coordinates of the best robot with nearly equal drives, and the number of iterations to find it. With separate
+    /// values for each joint, the search has more local minima; a start with equal drives avoids most of them.
     fn equal_drives_start(&self) -> (Option<Vec<f64>>, usize) {
         let settings = ServoSettings { alike: true, ..self.settings.clone() };
         let nominal = ServoRobot { drives: equal_drives(&self.nominal.drives), ..self.nominal.clone() };
@@ -257,8 +264,8 @@ impl Searcher<'_> {
         (start, iterations)
     }
 
-    /// The better of the ends of descents from `starts` and from `near`, which is close to a minimum and needs no
-    /// restarts; `None` if no start can be simulated.
+    /// Minimises from each of `starts` and from `near`, and returns the best result. `near` is close to a minimum, so
+    /// it needs no stage with restarts. `None` if no start can be simulated.
     fn best_of(&mut self, starts: Vec<Vec<f64>>, near: Option<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
         let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
         let step_s = COARSE * self.settings.step_s;
@@ -280,7 +287,8 @@ impl Searcher<'_> {
     }
 }
 
-/// Searches for the coordinates with the least cost: first with long time steps, then with those of the settings.
+/// Searches for the coordinates with the smallest cost: first with long time steps, then with the time step of the
+/// settings.
 ///
 /// # Errors
 /// Invalid settings or runs; a first simulation that fails.
@@ -330,7 +338,8 @@ pub fn search(
     searcher.stepping = Stepping::accurate(settings.step_s);
     let mut settled = false;
     let mut end = None;
-    // The number of neighbouring samples with the same error is that at the end of the search.
+    // The first pass gives the number of neighbouring samples with equal errors at the end of the search; the second
+    // uses it.
     for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
         searcher.tolerance = tolerance;
         let mut now = searcher.point(&z).ok_or_else(no_start)?;
@@ -357,7 +366,7 @@ pub fn search(
     })
 }
 
-/// Intervals in which the error of a joint is much larger than elsewhere.
+/// Time intervals in which the error of a joint is much larger than elsewhere.
 fn unexplained(joints: &[JointLikelihood], periods: &Periods, runs: &[Run]) -> Vec<Unexplained> {
     let mut found: Vec<Unexplained> = Vec::new();
     for (joint, own) in joints.iter().enumerate() {

@@ -6,12 +6,12 @@ use dynident_model::{Model, Vec3};
 /// A horizontal floor below the robot, without friction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Floor {
-    /// Height in the robot's base frame along the direction against gravity, m: that of the points when they touch, by
-    /// the measured positions without the joints' zeros.
+    /// Height of the floor in the base frame, measured opposite to gravity, m: the height of a touching point according
+    /// to the measured positions without the joints' zeros.
     pub height_m: f64,
-    /// Force per depth, N/m.
+    /// Contact force per depth, N/m.
     pub stiffness: f64,
-    /// Points of the robot that touch it first.
+    /// Points of the robot that can touch the floor.
     pub points: Vec<FloorPoint>,
 }
 
@@ -44,7 +44,7 @@ pub struct FloorPoint {
 pub(crate) struct PointHeight {
     pub(crate) height: f64,
     pub(crate) first: Vec<f64>,
-    /// dof × dof.
+    /// Second derivatives by the joint positions, dof × dof.
     pub(crate) second: Vec<f64>,
 }
 
@@ -53,8 +53,10 @@ impl PointHeight {
         Self { height: 0.0, first: vec![0.0; dof], second: vec![0.0; dof * dof] }
     }
 
-    /// At positions `q`. With axes `a`, origins `o` and the point `p`: `∂p/∂q_i = a_i × (p - o_i)` and, for a joint `i`
-    /// before `j`, `∂²p/∂q_i∂q_j = a_i × (a_j × (p - o_j))`; a slide has `a_i` and `a_i × a_j`.
+    /// Computes the height at positions `q`. With joint axes `a`, joint origins `o` and the point `p`:
+    /// `∂p/∂q_i = a_i × (p - o_i)` and, for a joint `i` before `j`, `∂²p/∂q_i∂q_j = a_i × (a_j × (p - o_j))`. If joint
+    /// `j` is a slide, they are `∂p/∂q_j = a_j` and `a_i × a_j`; if joint `i` is a slide, the second derivative is
+    /// zero.
     pub(crate) fn compute(&mut self, model: &Model, workspace: &mut Workspace, q: &[f64], point: &FloorPoint) {
         let dof = q.len();
         let placements = body_placements(model, workspace, q);

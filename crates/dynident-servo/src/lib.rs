@@ -1,9 +1,9 @@
-//! Which drives and bodies turn a robot's commands into the motion that was measured?
+//! Identification of servo drives and bodies from recorded commands and measured positions.
 //!
-//! For robots without torque sensors: servo arms, and every robot behind its own position loop. [`search`] fits the
-//! drives ([`Drive`]) and bodies of a [`ServoRobot`] so that its simulated motion along the recorded commands of the
-//! [`Run`]s is most like the measured one (output-error method: Gautier, Janot and Vandanjon, IEEE TCST 2013; Brunot et
-//! al., ASME JDSMC 142, 2020).
+//! Use it for robots without torque measurement: servo arms, and every robot with an internal position controller.
+//! [`search`] fits the drives ([`Drive`]) and bodies of a [`ServoRobot`] so that its simulated motion for the recorded
+//! commands of the [`Run`]s is most similar to the measured motion (output-error method: Gautier, Janot and Vandanjon,
+//! IEEE TCST 2013; Brunot et al., ASME JDSMC 142, 2020).
 #![forbid(unsafe_code)]
 
 mod command;

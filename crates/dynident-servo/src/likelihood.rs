@@ -1,25 +1,27 @@
-//! Likelihood of the errors of one joint, robust to periods that the model does not explain.
+//! Likelihood of the position errors of one joint, robust to time periods that the model does not explain.
 //!
-//! A contact, a push or an effect that the drive's law does not have makes single periods much worse than others. In
-//! period `p` with `n_p` samples, `N_p = n_p / c` of them independent, errors are normally distributed with variance
-//! `σ² λ_p`, and `1/λ_p` has a gamma distribution with mean 1 and `ν` degrees of freedom. Without `λ_p`, minus twice
-//! the logarithm of the density is
+//! A contact, a push or an effect that is missing in the drive's law causes much larger errors in single periods than
+//! in others. Period `p` contains `n_p` samples, of which `N_p = n_p / c` are independent (`c` neighbouring samples
+//! have equal errors). Its errors `e` are normally distributed with variance `σ² λ_p`, and `1/λ_p` has a gamma
+//! distribution with mean 1 and `ν` degrees of freedom. After integration over `λ_p`, minus twice the logarithm of the
+//! density is
 //!
 //! ```text
 //! Σ_p (ν + N_p) ln(1 + S_p / (c ν σ²)) + N_p ln σ²        S_p = Σ (e² + floor²)        w_p = (ν + N_p) / (ν + S_p / (c σ²))
 //! ```
 //!
-//! a multivariate t distribution (Lange, Little and Taylor, JASA 84, 1989). The derivative by an error is
-//! `2 w_p e / (c σ²)`, so a period has the weight `w_p`. `σ²` with the largest likelihood is `Σ w_p S_p / Σ n_p`.
+//! a multivariate t distribution (Lange, Little and Taylor, JASA 84, 1989). The derivative by an error `e` is
+//! `2 w_p e / (c σ²)`, so `w_p` is the weight of the period. The value of `σ²` with the largest likelihood is
+//! `Σ w_p S_p / Σ n_p`.
 
 use crate::normal::PeriodError;
 
-/// Most iterations for the variance. Each increases the likelihood.
+/// Maximum number of iterations for the variance; each iteration increases the likelihood.
 const MOST_ITERATIONS: usize = 200;
-/// Relative change of the variance at which the iterations end.
+/// Relative change of the variance below which the iterations end.
 const LEAST_CHANGE: f64 = 1e-9;
 
-/// Errors of one joint.
+/// Likelihood of the errors of one joint, and weights for the fit.
 #[derive(Clone, Debug)]
 pub(crate) struct JointLikelihood {
     /// Minus twice the logarithm of the likelihood.
@@ -32,7 +34,8 @@ pub(crate) struct JointLikelihood {
     pub(crate) error: f64,
 }
 
-/// The likelihood with the best variance. `correlated` is c, `freedom` is ν.
+/// Likelihood for the variance that maximises it. `correlated` is c, the number of neighbouring samples with equal
+/// errors; `freedom` is ν, the degrees of freedom.
 pub(crate) fn joint_likelihood(errors: &[PeriodError], floor: f64, correlated: f64, freedom: f64) -> JointLikelihood {
     let square = |own: &PeriodError| own.squares + own.count * floor * floor;
     let samples: f64 = errors.iter().map(|own| own.count).sum();

@@ -1,4 +1,4 @@
-//! Sums over all samples that a step of the search needs, for periods of the runs.
+//! Sums over the samples of each time period, which a step of the search needs.
 
 use crate::parameters::VariedRobot;
 use crate::rollout::Rollout;
@@ -8,11 +8,11 @@ use dynident_lanes::{Kernel, Lane, Level, dispatch_single};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// The periods of all runs, one after another.
+/// Division of all runs into time periods, numbered run after run.
 #[derive(Clone, Debug)]
 pub(crate) struct Periods {
     length_s: f64,
-    /// Index of the first period of each run, and the number of all periods.
+    /// Index of the first period of each run; the last entry is the number of all periods.
     firsts: Vec<usize>,
 }
 
@@ -36,19 +36,19 @@ impl Periods {
         self.firsts[run + 1] - self.firsts[run]
     }
 
-    /// Period of a sample, from the first of its run.
+    /// Index of the period of a sample, counted from the first period of its run.
     fn at(&self, run: &Run, sample: usize) -> usize {
         ((run.times_s[sample] - run.times_s[0]) / self.length_s) as usize
     }
 
-    /// Run of a period, and the time at which it begins, from the first stamp of the run.
+    /// Run of a period, and the start of the period, s after the first time stamp of the run.
     pub(crate) fn place(&self, period: usize) -> (usize, f64) {
         let run = self.firsts.partition_point(|first| *first <= period) - 1;
         (run, (period - self.firsts[run]) as f64 * self.length_s)
     }
 }
 
-/// Error of one joint in one period.
+/// Position error of one joint in one period.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PeriodError {
     /// `Σ e²`, where `e` is the measured position minus the simulated one.
@@ -80,7 +80,8 @@ pub(crate) fn period_errors(
     Some((0..joints).map(|joint| all.iter().flat_map(|run| run[joint].iter().copied()).collect()).collect())
 }
 
-/// Sums of one period with the weights `w` of its joints. `g` are the derivatives of a simulated position.
+/// Sums over one period. `w` are the weights of the joints, `g` the derivatives of a simulated position by the
+/// coordinates, `e` the position error.
 #[derive(Clone, Debug)]
 pub(crate) struct PeriodSums {
     /// `Σ w g gᵀ` over all joints, lower triangle, row by row.
@@ -98,7 +99,8 @@ impl PeriodSums {
     }
 }
 
-/// Sums of each period, with a weight of each joint in each period; `None` if the simulation of a run fails.
+/// Sums of each period. `weights` are the weights of each joint in each period. `None` if the simulation of a run
+/// fails.
 pub(crate) fn period_sums(
     varied: &VariedRobot,
     runs: &[Run],
@@ -159,7 +161,7 @@ impl Kernel for AddGram<'_> {
     }
 }
 
-/// The symmetric matrix of a lower triangle, row by row.
+/// The symmetric matrix whose lower triangle is given row by row.
 pub(crate) fn symmetric(triangle: &[f64], columns: usize) -> DMatrix<f64> {
     DMatrix::from_fn(columns, columns, |row, column| {
         let (low, high) = (row.min(column), row.max(column));

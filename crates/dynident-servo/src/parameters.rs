@@ -1,4 +1,4 @@
-//! Free parameters of a fit, and the robot that belongs to their values.
+//! Free parameters of a fit, and the robot for given values of these parameters.
 
 use crate::drive::Drive;
 use crate::floor::Floor;
@@ -16,29 +16,30 @@ pub struct ServoRobot {
     pub floor: Option<Floor>,
 }
 
-/// How a coordinate changes a value.
+/// How the coordinate of an unknown changes a value of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// The value is the robot's value times `exp(coordinate)`.
+    /// The value is the robot's nominal value times `exp(coordinate)`.
     Factor,
-    /// The value is the robot's value plus the coordinate.
+    /// The value is the robot's nominal value plus the coordinate.
     Sum,
 }
 
-/// One unknown of a fit. Several parameters may change the same value: one common to all joints and one for each.
+/// One unknown of a fit. Several unknowns may change the same value: one that is common to all joints, and one for each
+/// joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FreeParameter {
-    /// The changed quantity.
+    /// Quantity that the unknown changes.
     pub quantity: Quantity,
-    /// Joints, or bodies for a mass or a centre, that it changes.
+    /// Joints whose value it changes; for a mass or a centre of mass, bodies.
     pub members: Vec<usize>,
-    /// How it changes them.
+    /// How the coordinate changes these values.
     pub change: Change,
     /// Standard deviation of the coordinate before the fit; infinite without a prior.
     pub prior_sd: f64,
 }
 
-/// Effect of one coordinate on one value: derivative of the value of `index` by the coordinate.
+/// Effect of one coordinate on one value: the derivative of the value of joint or body `index` by the coordinate.
 #[derive(Clone, Debug)]
 pub(crate) struct Effect {
     pub(crate) column: usize,
@@ -55,7 +56,7 @@ pub(crate) struct BodyEffect {
     pub(crate) derivative: [f64; 10],
 }
 
-/// A robot at certain coordinates, with the derivatives of its values.
+/// A robot at given coordinates, with the derivatives of its values by the coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct VariedRobot {
     pub(crate) robot: ServoRobot,
@@ -69,7 +70,7 @@ pub(crate) struct VariedRobot {
 
 impl VariedRobot {
     /// # Errors
-    /// If the coordinates give bodies that are not numbers.
+    /// The coordinates give bodies with values that are not finite.
     pub(crate) fn new(
         nominal: &ServoRobot,
         parameters: &[FreeParameter],
@@ -131,11 +132,11 @@ impl VariedRobot {
     }
 }
 
-/// The robot at coordinates of the parameters, with read delays that are zero in the mean and delays that are not
-/// negative. Only the difference of both delays changes the measured motion.
+/// The robot at given coordinates of the free parameters. The measured motion determines only the difference of command
+/// delay and read delay; here the mean of the read delays is zero, and no delay is negative.
 ///
 /// # Errors
-/// If the coordinates give bodies that are not numbers.
+/// The coordinates give bodies with values that are not finite.
 pub fn robot_at(
     nominal: &ServoRobot,
     parameters: &[FreeParameter],
@@ -148,7 +149,8 @@ pub fn robot_at(
         drive.read_delay_s -= mean;
     }
     let earliest = robot.drives.iter().map(|drive| drive.delay_s).fold(0.0, f64::min);
-    // An effect before its command is a measurement after its stamp: only their difference matters.
+    // A negative command delay is replaced by a later measurement: only the difference of both delays changes the
+    // motion.
     for drive in &mut robot.drives {
         drive.delay_s -= earliest;
         drive.read_delay_s -= earliest;
@@ -156,7 +158,7 @@ pub fn robot_at(
     Ok(robot)
 }
 
-/// The body with its mass and inertia times a factor and its centre of mass moved.
+/// The body with mass and inertia multiplied by a factor and the centre of mass moved by a shift.
 fn changed(body: &InertialParameters, (factor, shift): &(f64, Vec3)) -> InertialParameters {
     let (Some(centre), Some(inertia)) = (body.com_m(), body.inertia_at_com()) else { return *body };
     if *factor == 1.0 && shift.0 == [0.0; 3] {
@@ -167,8 +169,8 @@ fn changed(body: &InertialParameters, (factor, shift): &(f64, Vec3)) -> Inertial
     InertialParameters::from_centre_of_mass(body.mass_kg() * factor, centre, &inertia)
 }
 
-/// Derivative of the inertial parameters by the centre of mass along `axis`, with constant mass and inertia about it:
-/// `∂I/∂c_k = m (2 c_k 1 - c e_kᵀ - e_k cᵀ)`.
+/// Derivative of the inertial parameters by the coordinate of the centre of mass along `axis`, for constant mass and
+/// constant inertia about the centre of mass: `∂I/∂c_k = m (2 c_k 1 - c e_kᵀ - e_k cᵀ)`.
 fn by_centre(body: &InertialParameters, axis: Axis) -> [f64; 10] {
     let k = axis as usize;
     let moment = body.first_moment().0;
@@ -183,7 +185,7 @@ fn by_centre(body: &InertialParameters, axis: Axis) -> [f64; 10] {
     InertialParameters::from_moments(0.0, Vec3(first), &Mat3(inertia)).0
 }
 
-/// The value of a robot's joint, body or floor.
+/// The value of `quantity` for a joint, body or floor of the robot.
 pub(crate) fn robot_value(robot: &ServoRobot, quantity: Quantity, index: usize) -> f64 {
     let body = || robot.model.inertials()[index];
     match quantity {
@@ -194,7 +196,7 @@ pub(crate) fn robot_value(robot: &ServoRobot, quantity: Quantity, index: usize) 
     }
 }
 
-/// The value of a drive that is called `quantity`.
+/// The value of a drive that `quantity` names.
 fn value_mut(drive: &mut Drive, quantity: Quantity) -> &mut f64 {
     match quantity {
         Quantity::Stiffness => &mut drive.stiffness,

@@ -1,32 +1,33 @@
 //! Set points that follow a command with limited acceleration and speed.
 //!
-//! Many servos do not use a command directly: a profile generator moves their set point to it in the shortest time,
-//! with an acceleration and a speed from two registers (Feetech "acceleration" and "goal speed", Dynamixel "profile
-//! acceleration" and "profile velocity"). For steps this adds a time that grows with the root of the step, and above
-//! a frequency that depends on the amplitude the phase falls by almost 90 degrees.
+//! Many servos do not control to the command directly. A profile generator moves their set point to the command in the
+//! shortest time, with an acceleration and a speed from two registers (Feetech "acceleration" and "goal speed",
+//! Dynamixel "profile acceleration" and "profile velocity"). For step commands, the profile adds a time that grows with
+//! the square root of the step. For sines, it adds a phase lag of almost 90 degrees above a frequency that depends on
+//! the amplitude.
 //!
-//! One cycle of length `h` with the distance `e` to the command chooses the velocity from which the set point can still
-//! stop at the command,
+//! In each cycle of length `h`, the generator selects the largest velocity from which the set point can still stop at
+//! the command, at the distance `e`:
 //!
 //! ```text
 //! w = sign(e) min(√(2 a |e| + (a h / 2)²) - a h / 2, |e| / h, speed)        v' = v + clip(w - v, ±a h)        z' = z + h v'
 //! ```
 //!
-//! the time-optimal profile of a double integrator in discrete time.
+//! This is the time-optimal profile of a double integrator in discrete time.
 
-/// Length of a cycle of the generator, s: servos have a control period of about 1 ms.
+/// Length of a cycle of the profile generator, s: servos have a control period of about 1 ms.
 const CYCLE_S: f64 = 1e-3;
 
-/// A set point over time: linear between cycles, constant before and after.
+/// A set point over time: linear between cycles, constant before the first and after the last.
 #[derive(Debug)]
 pub(crate) struct Profile {
     start_s: f64,
     values: Vec<f64>,
-    /// Integral from the start to each cycle.
+    /// Integral of the set point from the start to each cycle.
     integral: Vec<f64>,
 }
 
-/// The profile along held commands with limits of acceleration and speed, at rest at the first command.
+/// The profile for held commands with limits of acceleration and speed. It starts at rest at the first command.
 pub(crate) fn profile(times_s: &[f64], commands: &[f64], [acceleration, speed]: [f64; 2]) -> Profile {
     let start_s = times_s[0];
     let cycles = ((times_s[times_s.len() - 1] - start_s) / CYCLE_S).ceil() as usize + 1;
@@ -42,7 +43,7 @@ pub(crate) fn profile(times_s: &[f64], commands: &[f64], [acceleration, speed]: 
         }
         let distance = commands[at] - z;
         let size = distance.abs();
-        // Without a limit of the acceleration only the speed is limited.
+        // Without a limit on the acceleration, only the speed is limited.
         let stopping = if change.is_finite() {
             (2.0 * acceleration * size + 0.25 * change * change).sqrt() - 0.5 * change
         } else {
@@ -57,7 +58,7 @@ pub(crate) fn profile(times_s: &[f64], commands: &[f64], [acceleration, speed]: 
 }
 
 impl Profile {
-    /// Cycle and part of it at a time.
+    /// Index of the cycle that contains a time, and the part of the cycle that has passed.
     fn place(&self, time_s: f64) -> (usize, f64) {
         let place = ((time_s - self.start_s) / CYCLE_S).clamp(0.0, (self.values.len() - 1) as f64);
         (place as usize, place.fract())
@@ -70,17 +71,17 @@ impl Profile {
         self.values[cycle] + part * (next - self.values[cycle])
     }
 
-    /// Integral from the start to a time.
+    /// Integral of the set point from the start to a time.
     fn integral_to(&self, time_s: f64) -> f64 {
         let (cycle, part) = self.place(time_s);
         let until = self.integral[cycle] + 0.5 * part * CYCLE_S * (self.values[cycle] + self.at(time_s));
         let end_s = self.start_s + CYCLE_S * (self.values.len() - 1) as f64;
-        // Constant outside.
+        // Before the start, the set point has its first value.
         let before = (time_s - self.start_s).min(0.0) * self.values[0];
         until + before + (time_s - end_s).max(0.0) * self.values[self.values.len() - 1]
     }
 
-    /// Mean set point over `start_s` to `end_s`.
+    /// Mean set point from `start_s` to `end_s`.
     pub(crate) fn mean(&self, start_s: f64, end_s: f64) -> f64 {
         (self.integral_to(end_s) - self.integral_to(start_s)) / (end_s - start_s)
     }

@@ -1,39 +1,40 @@
-//! The numbers of a drive and of a body that a fit can change.
+//! The quantities of a drive and of a body that a fit can change.
 
 use serde::{Deserialize, Serialize};
 
-/// A number of one joint's drive, or of one body.
+/// A quantity of one joint's drive, or of one body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Position gain `kp`, Nm/rad (N/m).
     Stiffness,
-    /// Torque per velocity, Nm s/rad (N s/m): gain of the velocity, viscous friction and back-EMF together.
+    /// Torque per velocity, Nm s/rad (N s/m): sum of the velocity gain of the controller, viscous friction and
+    /// back-EMF.
     Damping,
     /// Inertia of rotor and gear at the joint, kg m² (kg).
     Armature,
     /// Coulomb friction without load, Nm (N).
     Coulomb,
-    /// Friction per torque that the gear carries, without unit.
+    /// Increase of friction per torque that the gear carries, without unit.
     LoadFriction,
-    /// Friction at rest above that in motion, Nm (N).
+    /// Difference between friction at rest and friction in motion (Stribeck effect), Nm (N).
     Stribeck,
-    /// Largest torque of the motor, Nm (N).
+    /// Largest torque of the position controller, Nm (N).
     TorqueLimit,
     /// Largest acceleration of the set point, rad/s² (m/s²).
     ProfileAcceleration,
     /// Largest speed of the set point, rad/s (m/s).
     ProfileSpeed,
-    /// Time from a command to its effect, s.
+    /// Delay from a command to its effect, s.
     Delay,
-    /// Time from a stamp to the measurement of the position, s.
+    /// Delay from a time stamp of the log to the measurement of the position, s.
     ReadDelay,
     /// Position of the model minus the measured position, rad (m).
     Zero,
     /// Height of the floor, m.
     FloorHeight,
-    /// Mass of a body; its inertia about the centre of mass grows in proportion. kg.
+    /// Mass of a body, kg. The inertia about the centre of mass changes in proportion.
     Mass,
     /// Centre of mass of a body along one axis of its frame, m.
     Centre(Axis),
@@ -53,7 +54,7 @@ pub enum Axis {
 }
 
 impl Quantity {
-    /// Name in words.
+    /// Name of the quantity in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stiffness => "stiffness",
@@ -76,7 +77,7 @@ impl Quantity {
         }
     }
 
-    /// Unit for a rotary joint, or for a slide.
+    /// Unit for a rotary joint or for a slide; empty for a quantity without unit.
     pub fn unit(self, is_rotary: bool) -> &'static str {
         match (self, is_rotary) {
             (Self::Stiffness, true) => "Nm/rad",
@@ -98,12 +99,12 @@ impl Quantity {
         }
     }
 
-    /// Whether the value belongs to a drive.
+    /// Whether the quantity belongs to a drive.
     pub fn is_of_drive(self) -> bool {
         !matches!(self, Self::Mass | Self::Centre(_) | Self::FloorHeight)
     }
 
-    /// Whether the value is a torque, an inertia or a mass, which positions give only up to one common factor.
+    /// Whether the quantity is a torque, an inertia or a mass. Positions determine these only up to one common factor.
     pub fn has_scale(self) -> bool {
         matches!(
             self,

@@ -1,14 +1,15 @@
-//! The motion that a robot's drives make of recorded commands.
+//! Simulation of the robot with its drives for recorded commands.
 //!
-//! One step of length `h` with the state `(q, v)` at its beginning solves for the velocity `x` at its end
+//! A step of length `h` starts in the state `(q, v)` (positions and velocities). It solves the following equation for
+//! the velocity `x` at its end:
 //!
 //! ```text
 //! τ(q + (1 - w) h v, v, a) + armature a = t(u)        a = (x - v) / h        u = w x + (1 - w) v        q' = q + h u
 //! ```
 //!
 //! where `τ` is the inverse dynamics of the bodies and `t` the torque of the drives (`step.rs`). With the weight
-//! `w = 1/2` the smooth parts are exact to second order: their midpoint rule adds no damping, whereas `w = 1` adds
-//! stiffness × h. Dry friction has the sign of `x`. The derivatives are in `sensitivity.rs`.
+//! `w = 1/2` (midpoint rule), smooth torques are exact to second order, and no damping is added; `w = 1` adds the
+//! damping stiffness × h. Dry friction acts against `x`. `sensitivity.rs` computes the derivatives.
 
 use crate::command::SetPoint;
 use crate::law::DriveLaw;
@@ -21,32 +22,32 @@ use crate::step_state::{StepState, Stepping};
 use dynident_dynamics::{Workspace, mass_matrix_and_bias};
 use dynident_model::Model;
 
-/// A simulation along the commands of one run.
+/// A simulation for the commands of one run.
 #[derive(Debug)]
 pub(crate) struct Rollout<'a> {
     varied: &'a VariedRobot,
     run: &'a Run,
-    /// The bodies with the run's payloads.
+    /// The bodies, including the payloads of the run.
     model: Model,
     workspace: Workspace,
     solver: StepSolver,
     step: StepState,
     stepping: Stepping,
-    /// If derivatives are computed.
+    /// Derivatives of the motion; `None` if they are not needed.
     sensitivity: Option<Sensitivity>,
 }
 
-/// The simulated position of one joint at one stamp, and its derivatives.
+/// Simulated position of one joint at one time stamp, and its derivatives.
 pub(crate) struct Predicted<'a> {
     pub(crate) joint: usize,
     pub(crate) sample: usize,
     pub(crate) position: f64,
-    /// One value for each coordinate; empty without derivatives.
+    /// Derivative of the position by each coordinate; empty if derivatives are not computed.
     pub(crate) derivatives: &'a [f64],
 }
 
 impl<'a> Rollout<'a> {
-    /// `None` if a payload of the run has no valid body.
+    /// Prepares a simulation; `None` if a payload of the run is not a valid body.
     pub(crate) fn new(
         varied: &'a VariedRobot,
         run: &'a Run,
@@ -71,8 +72,8 @@ impl<'a> Rollout<'a> {
         })
     }
 
-    /// Simulates from the first measured position at rest to the last stamp, and calls `each` for each joint and stamp
-    /// in order of time. Returns false if a step has no solution, or the motion is not a number.
+    /// Simulates from rest at the first measured position to the last time stamp, and calls `each` for each joint and
+    /// stamp in order of time. Returns false if a step has no solution or the motion diverges.
     #[must_use]
     pub(crate) fn simulate(mut self, mut each: impl FnMut(&Predicted<'_>)) -> bool {
         let drives = &self.varied.robot.drives;
@@ -91,7 +92,7 @@ impl<'a> Rollout<'a> {
         for step in 0..steps {
             let from = start + h * step as f64;
             let to = from + h;
-            // The conversion saturates without restarts.
+            // Without restarts the period is infinite, and its conversion saturates at the largest integer.
             if step > 0 && step % period as usize == 0 {
                 self.restart(from);
             }
@@ -123,7 +124,7 @@ impl<'a> Rollout<'a> {
         }
     }
 
-    /// Makes one step. Returns false without a solution.
+    /// Makes one step from time `from` to time `to`. Returns false if the step has no solution.
     fn advance(&mut self, commands: &mut [SetPoint<'_>], from: f64, to: f64) -> bool {
         self.set_equation(commands, from, to);
         let step = &mut self.step;
@@ -144,7 +145,7 @@ impl<'a> Rollout<'a> {
         true
     }
 
-    /// Sets the state to the measured motion at time `at`.
+    /// Sets the state of the simulation to the measured motion at time `at`.
     fn restart(&mut self, at: f64) {
         let drives = &self.varied.robot.drives;
         for (joint, drive) in drives.iter().enumerate() {
@@ -155,12 +156,12 @@ impl<'a> Rollout<'a> {
         }
     }
 
-    /// Sets matrix, right side and laws of the step.
+    /// Computes the matrix, the right side and the torque laws of the step.
     fn set_equation(&mut self, commands: &mut [SetPoint<'_>], from: f64, to: f64) {
         let (robot, step) = (&self.varied.robot, &mut self.step);
         let dof = step.q.len();
         let (weight, h) = (step.end_weight, step.h);
-        // Part of the mean velocity that is known before the step.
+        // Share of the velocity at the beginning of the step in the mean velocity.
         let known = 1.0 - weight;
         for (joint, drive) in robot.drives.iter().enumerate() {
             step.in_model[joint] = step.q[joint] + drive.zero + known * h * step.v[joint];

@@ -3,11 +3,12 @@
 use crate::error::{RunFault, ServoError};
 use dynident_model::InertialParameters;
 
-/// Longest time between two samples, s: the simulation continues with the command before a gap.
+/// Maximum time between two samples, s. During a gap, the simulation continues with the last command.
 const LONGEST_GAP_S: f64 = 10.0;
-/// Samples before and after a time that give its velocity: quantisation makes single differences noisy.
+/// Number of samples before and after a time from which its velocity is computed. Quantisation makes differences of
+/// neighbouring samples noisy.
 const VELOCITY_SAMPLES: usize = 2;
-/// Least number of samples of a run.
+/// Minimum number of samples of a run.
 const LEAST_SAMPLES: usize = 20;
 
 /// A recording of commands and measured positions of all joints.
@@ -15,16 +16,16 @@ const LEAST_SAMPLES: usize = 20;
 pub struct Run {
     /// Name in messages.
     pub name: String,
-    /// Stamps, s, rising.
+    /// Time stamps, s, increasing.
     pub times_s: Vec<f64>,
-    /// Commands of each joint at the stamps, rad (m); each holds until the next.
+    /// Commands of each joint at the time stamps, rad (m); each command is held until the next.
     pub commands: Vec<Vec<f64>>,
-    /// Measured positions of each joint at the stamps, rad (m).
+    /// Measured positions of each joint at the time stamps, rad (m).
     pub positions: Vec<Vec<f64>>,
-    /// Known loads during the run: body, and inertial parameters in its frame.
+    /// Known payloads during the run: index of the body, and inertial parameters in the frame of the body.
     pub payloads: Vec<(usize, InertialParameters)>,
-    /// Position gain of each joint in this run, relative to the stiffness of its drive: firmware with another gain, or
-    /// 0 with the controller off. Empty if all are 1.
+    /// Position gain of each joint in this run, relative to the stiffness of its drive, for firmware with another gain;
+    /// 0 if the controller was off. Empty if all are 1.
     pub gains: Vec<f64>,
 }
 
@@ -41,7 +42,8 @@ impl Run {
         self.gains.get(joint).copied().unwrap_or(1.0)
     }
 
-    /// Measured position of a joint at a time, interpolated, and its mean velocity over the samples nearby.
+    /// Measured position of a joint at a time, interpolated between samples, and the mean velocity over the
+    /// neighbouring samples.
     pub(crate) fn measured(&self, joint: usize, time_s: f64) -> (f64, f64) {
         let (times, positions) = (&self.times_s, &self.positions[joint]);
         let last = times.len() - 1;

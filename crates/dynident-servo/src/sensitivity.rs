@@ -1,15 +1,15 @@
-//! Derivatives of a simulated motion by all unknowns.
+//! Derivatives of a simulated motion by all unknowns (coordinates).
 //!
-//! The derivative of the equation of a step (`rollout.rs`) by one coordinate, with the derivatives `S_q`, `S_v` of the
-//! state at its beginning, gives that of the velocity at its end:
+//! `S_q` and `S_v` are the derivatives of position and velocity at the beginning of a step by one coordinate.
+//! Differentiating the equation of the step (`rollout.rs`) gives the derivative `S_x` of the velocity at its end:
 //!
 //! ```text
 //! (A + slopes) S_x = C_q S_q + C_v S_v + effect of the coordinate        A = (M + armature) / h        S_u = w S_x + (1 - w) S_v
 //! ```
 //!
-//! for the moving joints; a resting joint has `S_x = 0`. `A + slopes` is the matrix that solved the step. `C_q` and
-//! `C_v` contain the derivatives of the torques of bodies, drives and contacts by the state, with constant `A`. They
-//! are computed once for all coordinates.
+//! The equation applies to the moving joints; a resting joint has `S_x = 0`. `A + slopes` is the matrix of the step's
+//! equation. `C_q` and `C_v` contain the derivatives of the torques of bodies, drives and contacts by the state, with
+//! constant `A`. They are computed once for all coordinates.
 
 use crate::floor::Floor;
 use crate::parameters::VariedRobot;
@@ -20,25 +20,26 @@ use dynident_dynamics::{Workspace, inverse_dynamics_derivatives, torque_regresso
 use dynident_lanes::{Kernel, Lane, Level, dispatch_single};
 use dynident_model::Model;
 
-/// Derivatives of position and velocity: dof rows with one value for each coordinate.
+/// Derivatives of positions and velocities by the coordinates: `dof` rows with one value for each coordinate.
 #[derive(Debug)]
 pub(crate) struct Sensitivity {
     columns: usize,
     level: Level,
     by_q: Vec<f64>,
     by_v: Vec<f64>,
-    /// Of the mean velocity of the last step.
+    /// Derivatives of the mean velocity of the last step.
     by_mean: Vec<f64>,
-    /// Direct effects of the coordinates, then the right sides and the derivatives of the velocity at the end.
+    /// Direct effects of the coordinates on the equation; later the right sides, then the derivatives of the velocity
+    /// at the end of the step.
     rows: Vec<f64>,
-    /// `C_q` and `C_v`, dof × dof, row-major.
+    /// Matrices `C_q` and `C_v`, dof × dof, row-major.
     of_q: Vec<f64>,
     of_v: Vec<f64>,
     /// Regressor of the bodies' torque.
     regressor: Vec<f64>,
     still: Vec<f64>,
     acceleration: Vec<f64>,
-    /// Change of each joint's friction by its load.
+    /// Derivative of each joint's friction by its load torque.
     by_load: Vec<f64>,
 }
 
@@ -61,13 +62,13 @@ impl Sensitivity {
         }
     }
 
-    /// The state no longer depends on the coordinates.
+    /// Sets all derivatives to zero, because the state was set to the measured motion.
     pub(crate) fn restart(&mut self) {
         self.by_q.fill(0.0);
         self.by_v.fill(0.0);
     }
 
-    /// Derivatives of the position of a joint `rest` seconds before the end of the last step.
+    /// Derivatives of the position of a joint at the time `rest` seconds before the end of the last step.
     pub(crate) fn before_end(&self, joint: usize, rest: f64, out: &mut [f64]) {
         let own = joint * self.columns..(joint + 1) * self.columns;
         for ((out, q), v) in out.iter_mut().zip(&self.by_q[own.clone()]).zip(&self.by_mean[own]) {
@@ -75,7 +76,7 @@ impl Sensitivity {
         }
     }
 
-    /// Advances the derivatives by a step that `solver` has just solved.
+    /// Advances the derivatives over the step that `solver` has just solved.
     pub(crate) fn advance(
         &mut self,
         varied: &VariedRobot,
@@ -98,8 +99,8 @@ impl Sensitivity {
         dispatch_single(level, Solve { sensitivity: self, solver, step });
     }
 
-    /// Subtracts the derivatives of the bodies' torque `τ(q + (1 - w) h v, v, a)` with constant acceleration, and of
-    /// the friction by the load `τ(q + (1 - w) h v, v, 0)`.
+    /// Subtracts the derivatives of two torques: the bodies' torque `τ(q + (1 - w) h v, v, a)` for constant
+    /// acceleration, and the friction that depends on the load `τ(q + (1 - w) h v, v, 0)`.
     fn add_bodies(&mut self, varied: &VariedRobot, (model, workspace): (&Model, &mut Workspace), step: &StepState) {
         let dof = step.q.len();
         for ((by_load, drive), (mode, load)) in
@@ -133,7 +134,7 @@ impl Sensitivity {
                 sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += part * own);
             }
         }
-        // The zero of a joint moves the position in the model.
+        // The zero of a joint shifts its position in the model.
         for effect in varied.effects.iter().filter(|effect| effect.quantity == Quantity::Zero) {
             for joint in 0..dof {
                 self.rows[joint * self.columns + effect.column] +=
@@ -191,7 +192,9 @@ impl Sensitivity {
         }
     }
 
-    /// Adds the derivatives of the contacts' torques `J N`, whose force is `N = K (height - z - h J u)`.
+    /// Adds the derivatives of the contacts' torques `Jᵀ N`. The contact force is `N = K (height - z - h J u)`: `K` is
+    /// the stiffness of the floor, `z` the height of the point, `J` its derivative by the joint positions and `u` the
+    /// mean velocity.
     fn add_contacts(&mut self, floor: &Floor, varied: &VariedRobot, step: &StepState) {
         let (dof, columns) = (step.q.len(), self.columns);
         let known = 1.0 - step.end_weight;
@@ -230,7 +233,7 @@ impl Kernel for Solve<'_> {
     fn run<T: Lane>(self) {
         let Self { sensitivity: own, solver, step } = self;
         let (dof, columns, weight) = (step.q.len(), own.columns, step.end_weight);
-        // Right sides of the moving joints, in the rows that the solver expects.
+        // The rows of the moving joints in the order that the solver expects.
         for (row, &joint) in solver.moving.iter().enumerate() {
             if row != joint {
                 own.rows.copy_within(joint * columns..(joint + 1) * columns, row * columns);

@@ -1,7 +1,8 @@
-//! First values of the drives, from the response of each joint.
+//! First values of the drives for the search, from the response of each joint to its commands.
 //!
-//! Each joint alone is treated as `ẍ = ω² (r - x) - 2 ζ ω ẋ` with the late command `r`. The best of a grid of ω, ζ and
-//! delays gives stiffness and damping, with the mean inertia of the joint during the motion.
+//! Each joint is approximated separately by `ẍ = ω² (r - x) - 2 ζ ω ẋ`, with the position x, the delayed command `r`,
+//! the natural frequency ω and the damping ratio ζ. The best combination of ω, ζ and delay on a grid gives stiffness
+//! and damping, together with the mean inertia of the joint during the motion.
 
 use crate::command::{HeldCommand, SetPoint};
 use crate::drive::Drive;
@@ -12,25 +13,26 @@ use dynident_dynamics::{Workspace, mass_matrix};
 use dynident_model::Model;
 use rayon::prelude::*;
 
-/// Natural frequencies of a position loop, rad/s.
+/// Natural frequencies on the grid, rad/s.
 const FREQUENCIES: [f64; 9] = [3.0, 5.0, 8.0, 13.0, 20.0, 32.0, 50.0, 80.0, 130.0];
-/// Damping ratios of a position loop.
+/// Damping ratios on the grid.
 const RATIOS: [f64; 6] = [0.3, 0.6, 1.0, 1.6, 2.5, 4.0];
-/// Most samples of a run that are used, for speed.
+/// Maximum number of samples of a run that are used, to save time.
 const MOST_SAMPLES: usize = 1500;
-/// Part of the joint's inertia that the first guess gives to the drive.
+/// Share of a joint's inertia that is first attributed to the drive.
 const DRIVE_PART: f64 = 0.5;
-/// First friction, as a part of the stiffness times the median distance from the command.
+/// First value of the friction, relative to the stiffness times the median distance from the command.
 const FRICTION_PART: f64 = 0.3;
-/// Velocity at which most of the friction at rest is gone, rad/s (m/s): that of Rhoban's servo models.
+/// Velocity at which most of the Stribeck effect has disappeared, rad/s (m/s); from Rhoban's servo models.
 const STRIBECK_SPEED: f64 = 0.1;
 /// Delay of a typical servo, s.
 const TYPICAL_DELAY_S: f64 = 0.01;
-/// Delays of a position loop, s.
+/// Delays on the grid, s.
 const DELAYS_S: [f64; 5] = [0.0, 0.01, 0.02, 0.04, 0.06];
 
 impl Drive {
-    /// A drive with these values (units of the fields), and typical other friction and delay, without a torque limit.
+    /// A drive with these values (in the units of the fields), typical values for other friction and delay, and no
+    /// torque limit.
     pub fn typical(stiffness: f64, damping: f64, armature: f64, coulomb: f64) -> Self {
         Self {
             stiffness,
@@ -50,12 +52,14 @@ impl Drive {
     }
 }
 
-/// First values of all drives; equal ones if all joints have the same servo (`alike`). Profiles are those of `stated`.
+/// First values of all drives. They are equal if all joints have the same type of servo (`alike`). Profile limits are
+/// taken from `stated`.
 pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) -> Vec<Drive> {
     let runs: &[Run] = &runs.iter().map(|run| behind_profiles(run, stated)).collect::<Vec<_>>();
     let mut inertias = mean_inertias(model, runs);
     if !alike {
-        // The drive of a light distal link has more inertia than the link: halfway, in logarithms, to the mean.
+        // The drive of a light distal link has more inertia than the link. Therefore the geometric mean of the joint's
+        // own inertia and the mean over all joints is used.
         let mean = inertias.iter().sum::<f64>() / inertias.len() as f64;
         for inertia in &mut inertias {
             *inertia = (*inertia * mean).sqrt();
@@ -72,7 +76,7 @@ pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) 
             Drive { profile_acceleration, profile_speed, delay_s, ..drive }
         })
         .collect();
-    // Delays are common: those of the electronics.
+    // The delays are caused by the common electronics, so all joints get the same value.
     let mut delays: Vec<f64> = drives.iter().map(|drive| drive.delay_s).collect();
     delays.sort_by(f64::total_cmp);
     for drive in &mut drives {
@@ -81,7 +85,7 @@ pub fn start_drives(model: &Model, runs: &[Run], stated: &[Drive], alike: bool) 
     if alike { equal_drives(&drives) } else { drives }
 }
 
-/// The run with the set points of the drives' profiles as commands.
+/// The run with its commands replaced by the set points of the drives' profiles.
 fn behind_profiles(run: &Run, drives: &[Drive]) -> Run {
     let times = &run.times_s;
     let commands = run.commands.iter().zip(drives).map(|(commands, drive)| {
@@ -93,7 +97,7 @@ fn behind_profiles(run: &Run, drives: &[Drive]) -> Run {
     Run { commands: commands.collect(), ..run.clone() }
 }
 
-/// Mean diagonal of the mass matrix over the runs.
+/// Mean diagonal of the mass matrix over the motion of the runs.
 fn mean_inertias(model: &Model, runs: &[Run]) -> Vec<f64> {
     let dof = model.dof();
     let mut workspace = Workspace::new(model);
@@ -108,7 +112,7 @@ fn mean_inertias(model: &Model, runs: &[Run]) -> Vec<f64> {
             count += 1.0;
         }
     }
-    // A joint without mass behind it still has a drive.
+    // The drive of a joint without mass behind it still has inertia.
     sums.iter().map(|sum| (sum / count).max(1e-6)).collect()
 }
 
@@ -122,8 +126,9 @@ fn median_distance(runs: &[Run], joint: usize) -> f64 {
     distances[distances.len() / 2].max(1e-5)
 }
 
-/// Coordinates of the responses of the joints, for a search whose nominal drives may be far away: values that several
-/// joints share get the mean. Deviations of the joints from it are zero if not `with_own`.
+/// Coordinates at which the drives have the values from the responses of the joints, as another start of the search if
+/// the nominal drives are far from the real ones. Values that several joints share get the mean. Unless `with_own` is
+/// set, the deviations of single joints from the mean are zero.
 pub(crate) fn response_coordinates(
     nominal: &ServoRobot,
     parameters: &[FreeParameter],
@@ -146,8 +151,9 @@ pub(crate) fn response_coordinates(
     drive_coordinates(nominal, parameters, &responses, is_found, with_own)
 }
 
-/// Coordinates at which the drives of `nominal` have the values of `robot` for the quantities of `is_found`; zero for
-/// others. A value that several joints share gets the mean, and each joint its deviation if `with_own`.
+/// Coordinates at which the drives of `nominal` have the values of `robot`, for the quantities that `is_found` selects;
+/// other coordinates are zero. A value that several joints share gets the mean over the joints. If `with_own` is set,
+/// each joint also gets its deviation from the mean.
 pub(crate) fn drive_coordinates(
     nominal: &ServoRobot,
     parameters: &[FreeParameter],
@@ -181,8 +187,8 @@ pub(crate) fn drive_coordinates(
     parameters.iter().map(coordinate).collect()
 }
 
-/// Drives with the same values: the means over the joints. Profiles, torque limits and zeros stay; the delay is that of
-/// the first drive.
+/// Drives with equal values: the means over the joints. Profile limits, torque limits and zeros are unchanged; the
+/// delay is that of the first drive.
 pub(crate) fn equal_drives(drives: &[Drive]) -> Vec<Drive> {
     let mean = |value: fn(&Drive) -> f64| {
         let logs = drives.iter().map(|drive| value(drive).max(f64::MIN_POSITIVE).ln());
@@ -207,7 +213,7 @@ pub(crate) fn equal_drives(drives: &[Drive]) -> Vec<Drive> {
     drives.iter().map(with_own).collect()
 }
 
-/// Response of one joint: natural frequency, rad/s, damping ratio and delay.
+/// Response of one joint: natural frequency (rad/s), damping ratio and delay.
 #[derive(Clone, Copy)]
 struct Response {
     frequency: f64,
@@ -215,7 +221,7 @@ struct Response {
     delay_s: f64,
 }
 
-/// The response with the least error.
+/// Response on the grid with the smallest error.
 fn response(runs: &[Run], joint: usize) -> Response {
     let grid = DELAYS_S.iter().flat_map(|&delay_s| {
         FREQUENCIES
@@ -229,8 +235,8 @@ fn response(runs: &[Run], joint: usize) -> Response {
     all[best]
 }
 
-/// Sum of squared errors of the response, by implicit steps from stamp to stamp, without the mean error, which is the
-/// effect of gravity.
+/// Sum of the squared errors of a response, simulated by implicit steps from stamp to stamp. The mean error is
+/// subtracted, because it is the effect of gravity.
 fn response_error(run: &Run, joint: usize, response: Response) -> f64 {
     let (commands, positions) = (&run.commands[joint], &run.positions[joint]);
     let Response { frequency, ratio, delay_s } = response;

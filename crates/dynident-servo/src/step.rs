@@ -8,9 +8,10 @@
 //! A x - w = t(x)          A = (M + armature) / h
 //! ```
 //!
-//! `A` is positive definite, so exactly one solution exists (Moreau's time stepping; Anitescu and Potra 1997). It is
-//! found by changing the modes of joints that contradict their assumption: first all, then one by one with the least
-//! index, which ends for such problems (Murty 1974).
+//! `A` is positive definite, so exactly one solution exists (Moreau's time stepping; Anitescu and Potra 1997). Each
+//! joint is assumed to be in one mode (moving or resting, controller at its limit or not). Modes that the solution
+//! contradicts are changed: first all of them, later only the one with the smallest index, which is known to terminate
+//! for such problems (Murty 1974).
 
 /// The torque of one joint as a function of the velocity at the end of the step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,18 +20,18 @@ pub(crate) struct JointLaw {
     pub(crate) stiffness: f64,
     /// Torque of the position controller at zero velocity.
     pub(crate) pull: f64,
-    /// Its decrease per velocity: stiffness × time step.
+    /// Decrease of this torque per velocity: stiffness × time step.
     pub(crate) slope: f64,
-    /// Its largest value.
+    /// Largest torque of the position controller.
     pub(crate) limit: f64,
-    /// Damping.
+    /// Damping torque per velocity.
     pub(crate) damping: f64,
-    /// Largest friction.
+    /// Largest friction torque.
     pub(crate) friction: f64,
 }
 
 impl JointLaw {
-    /// The law whose limit applies to the sum of the position controller and the damping.
+    /// The law with the limit applied to the sum of position controller and damping.
     pub(crate) fn with_limited_damping(self) -> Self {
         Self { slope: self.slope + self.damping, damping: 0.0, ..self }
     }
@@ -41,7 +42,7 @@ impl JointLaw {
     }
 }
 
-/// How a joint moves in a step.
+/// Direction of motion of a joint in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) enum Motion {
     #[default]
@@ -65,7 +66,7 @@ impl Motion {
     }
 }
 
-/// Whether the position controller is at its limit.
+/// Whether the torque of the position controller is at its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) enum Clip {
     #[default]
@@ -74,7 +75,7 @@ pub(crate) enum Clip {
     Lower,
 }
 
-/// The linear piece of a joint's torque.
+/// Mode of a joint: the piece of its piecewise linear torque that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(crate) struct Mode {
     pub(crate) motion: Motion,
@@ -82,7 +83,7 @@ pub(crate) struct Mode {
 }
 
 impl Mode {
-    /// Torque at zero velocity without friction, and its decrease per velocity.
+    /// Torque at zero velocity without friction, and its decrease per velocity, for this mode.
     fn piece(self, law: &JointLaw) -> (f64, f64) {
         match self.clip {
             Clip::Inside => (law.pull, law.slope + law.damping),
@@ -91,8 +92,8 @@ impl Mode {
         }
     }
 
-    /// The next mode on the way to `required`: one condition changes, and a controller passes from one limit to the
-    /// other through its linear part.
+    /// The next mode on the way to `required`: only one condition changes, and a controller changes from one limit to
+    /// the other through its linear range.
     fn towards(self, required: Self) -> Self {
         match (self.clip, required.clip) {
             (own, other) if own == other => required,
@@ -101,7 +102,7 @@ impl Mode {
         }
     }
 
-    /// The mode that velocity `x` and the torque without friction at rest, `rest`, require.
+    /// The mode that belongs to velocity `x` and to `rest`, the torque without friction at rest.
     fn required(self, law: &JointLaw, x: f64, rest: f64) -> Self {
         let controller = law.pull - law.slope * x;
         let clip = if controller > law.limit {
@@ -123,22 +124,23 @@ impl Mode {
     }
 }
 
-/// A point that can touch the floor: force `max(0, push - slope J x)`.
+/// A point that can touch the floor. At velocity `x` the contact force is `max(0, push - slope J x)`, where J is the
+/// Jacobian of the point's height.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contact {
-    /// Force at zero velocity.
+    /// Contact force at zero velocity.
     pub(crate) push: f64,
-    /// Its decrease per velocity of the point: stiffness × time step.
+    /// Decrease of the force per velocity of the point: stiffness × time step.
     pub(crate) slope: f64,
-    /// Velocity of the point along the floor's normal by each joint.
+    /// Jacobian of the point's height: velocity of the point along the floor's normal per velocity of each joint.
     pub(crate) by_joint: Vec<f64>,
-    /// Whether it touches.
+    /// Whether the point touches the floor.
     pub(crate) touches: bool,
-    /// The force of the solution.
+    /// Contact force in the solution.
     pub(crate) force: f64,
 }
 
-/// The torques of a step, as functions of the velocities at its end.
+/// The torques of all joints and contacts in a step, as functions of the velocities at its end.
 #[derive(Debug)]
 pub(crate) struct StepLaws {
     pub(crate) joints: Vec<JointLaw>,
@@ -146,20 +148,20 @@ pub(crate) struct StepLaws {
     pub(crate) contacts: Vec<Contact>,
 }
 
-/// A step that is being solved; the factor of the last solution serves the derivatives.
+/// Solver for one step. It keeps the factorised matrix of the last solution for the computation of derivatives.
 #[derive(Debug)]
 pub(crate) struct StepSolver {
     dof: usize,
-    /// Lower triangle of the Cholesky factor of the moving joints, dof × dof.
+    /// Lower triangle of the Cholesky factor of the matrix for the moving joints, dof × dof.
     factor: Vec<f64>,
-    /// The moving joints, in order.
+    /// Indices of the moving joints, in increasing order.
     pub(crate) moving: Vec<usize>,
     solution: Vec<f64>,
 }
 
-/// After this many changes of all modes at once, one joint changes at a time.
+/// Number of changes of all contradicted modes at once, after which only one joint changes at a time.
 const JOINT_CHANGES: usize = 8;
-/// No problem of practical size needs more changes.
+/// Maximum number of mode changes; no problem of practical size needs more.
 const MOST_CHANGES: usize = 400;
 
 impl StepSolver {
@@ -167,9 +169,9 @@ impl StepSolver {
         Self { dof, factor: vec![0.0; dof * dof], moving: Vec::with_capacity(dof), solution: vec![0.0; dof] }
     }
 
-    /// Velocities `x` at the end of the step, from `a` (dof × dof, row-major), `w` and the laws. Their modes contain
-    /// the first guess and receive the modes of the solution. Returns false if the modes did not settle or the matrix
-    /// is not positive definite; `x` then is not a solution.
+    /// Computes the velocities `x` at the end of the step from the matrix `a` (dof × dof, row-major), the right side
+    /// `w` and the laws. The modes in the laws are a first guess and are replaced by the modes of the solution. Returns
+    /// false if no consistent modes are found or the matrix is not positive definite; `x` is then not a solution.
     #[must_use]
     pub(crate) fn solve(&mut self, a: &[f64], w: &[f64], laws: &mut StepLaws, x: &mut [f64]) -> bool {
         for change in 0..MOST_CHANGES {
@@ -183,7 +185,8 @@ impl StepSolver {
         false
     }
 
-    /// Changes the modes that contradict the solution, at most one if `one`. Returns whether any changed.
+    /// Changes the modes that the solution contradicts, only one of them if `one` is true. Returns whether any mode
+    /// changed.
     fn change_modes(&self, a: &[f64], w: &[f64], laws: &mut StepLaws, x: &[f64], one: bool) -> bool {
         let mut changed = false;
         for contact in &mut laws.contacts {
@@ -274,7 +277,7 @@ impl StepSolver {
         self.solution = solution;
     }
 
-    /// Solves for several right sides at once: `rows` has one row of `width` values for each moving joint.
+    /// Solves for several right sides at once. `rows` contains one row of `width` values for each moving joint.
     #[inline(always)]
     pub(crate) fn apply_inverse(&self, rows: &mut [f64], width: usize) {
         let dof = self.dof;
@@ -298,7 +301,7 @@ impl StepSolver {
     }
 }
 
-/// `own -= factor · other`.
+/// Computes `own -= factor · other`.
 #[inline(always)]
 pub(crate) fn subtract(own: &mut [f64], other: &[f64], factor: f64) {
     for (own, other) in own.iter_mut().zip(other) {

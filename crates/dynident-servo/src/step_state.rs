@@ -1,21 +1,21 @@
-//! State and equation of one time step.
+//! State and equation of one time step of the simulation.
 
 use crate::command::StepCommand;
 use crate::floor::PointHeight;
 use crate::law::DriveLaw;
 use crate::step::{Contact, JointLaw, Mode, StepLaws};
 
-/// How a simulation steps.
+/// Method and step length of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stepping {
     /// Length of a step, s.
     pub(crate) step_s: f64,
-    /// Weight of the velocity at the end of a step in its mean velocity: 1/2 is exact to second order, 1 damps and is
-    /// stable for long steps.
+    /// Weight of the velocity at the end of a step in the mean velocity of the step: 1/2 is exact to second order, 1
+    /// adds damping and is stable for long steps.
     pub(crate) end_weight: f64,
-    /// The simulation restarts from the measured motion after this time, s; never if infinite.
+    /// Time after which the simulation restarts from the measured motion, s; infinite for no restarts.
     pub(crate) restart_s: f64,
-    /// How the torque of the drives is computed. Derivatives are those of [`DriveLaw::Identified`].
+    /// Law by which the torque of the drives is computed. Derivatives are only available for [`DriveLaw::Identified`].
     pub(crate) law: DriveLaw,
 }
 
@@ -31,38 +31,38 @@ impl Stepping {
     }
 }
 
-/// A step: the state at its beginning, the equation, and the velocity at its end.
+/// One step: the state at its beginning, the equation, and the velocity at its end.
 #[derive(Debug)]
 pub(crate) struct StepState {
-    /// Length, s.
+    /// Length of the step, s.
     pub(crate) h: f64,
-    /// Weight of the velocity at the end in the mean velocity.
+    /// Weight of the velocity at the end of the step in the mean velocity.
     pub(crate) end_weight: f64,
-    /// Measured positions: those of the encoders.
+    /// Positions that the encoders measure.
     pub(crate) q: Vec<f64>,
-    /// Positions in the model, with the zeros of the joints, where bodies are evaluated: those expected in the middle
-    /// of the step if `end_weight` is 1/2, those at its beginning if it is 1.
+    /// Positions in the model (with the zeros of the joints), at which the bodies' torque is evaluated: expected
+    /// positions in the middle of the step if `end_weight` is 1/2, positions at its beginning if it is 1.
     pub(crate) in_model: Vec<f64>,
     pub(crate) v: Vec<f64>,
-    /// `(M + armature) / h`.
+    /// Matrix of the equation, `(M + armature) / h` with the mass matrix M.
     pub(crate) a: Vec<f64>,
     pub(crate) w: Vec<f64>,
-    /// Torques of weight and velocity.
+    /// Torques of weight and velocity that the gears carry.
     pub(crate) loads: Vec<f64>,
-    /// Part of the friction at rest that is left at the velocity.
+    /// Remaining share of the Stribeck effect at the velocity of each joint.
     pub(crate) at_rest: Vec<f64>,
     /// Set points of the joints.
     pub(crate) commands: Vec<StepCommand>,
     pub(crate) laws: StepLaws,
     pub(crate) heights: Vec<PointHeight>,
-    /// Velocities at the end.
+    /// Velocities at the end of the step.
     pub(crate) x: Vec<f64>,
     /// Mean velocities `end_weight x + (1 - end_weight) v`.
     pub(crate) mean: Vec<f64>,
 }
 
 impl StepState {
-    /// The first step from rest at `q`, with `points` that can touch the floor.
+    /// The first step, from rest at `q`. `points` is the number of points that can touch the floor.
     pub(crate) fn at_rest(q: Vec<f64>, stepping: &Stepping, points: usize) -> Self {
         let dof = q.len();
         let zeros = || vec![0.0; dof];

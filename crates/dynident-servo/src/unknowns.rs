@@ -1,21 +1,21 @@
-//! The unknowns of a fit and what is known of them before.
+//! The unknowns of a fit, and the knowledge about them before the fit.
 
 use crate::parameters::{Change, FreeParameter, ServoRobot};
 use crate::quantity::{Axis, Quantity};
 use crate::settings::ServoSettings;
 
-/// Standard deviation of the logarithm of a value of which nothing but the order of magnitude is known.
+/// Standard deviation of the logarithm of a value for which only the order of magnitude is known.
 const WIDE: f64 = 2.0;
 
-/// Standard deviation of the logarithm of a value that all joints share. Its centre comes from the responses of the
-/// joints, which contain the drives' inertia only by a guess, and it must not decide the common factor of all torques,
-/// inertias and masses: the masses of the robot description do.
+/// Standard deviation of the logarithm of a value that all joints share. Its first value is computed from the responses
+/// of the joints and a guess of the drives' inertia. The prior must be wide so that this guess does not determine the
+/// common factor of all torques, inertias and masses; the masses of the robot description determine the factor.
 const FREE: f64 = 10.0;
 
-/// Least reach of a robot, m: a prior without width would exclude every motion.
+/// Minimum reach of a robot, m: a prior of zero width would exclude every motion of the centre of mass.
 const LEAST_REACH_M: f64 = 0.01;
 
-/// The unknowns of a robot: values of the drives, common and for each joint, and bodies.
+/// The unknowns of a robot: values of the drives (common values and values of single joints), and of the bodies.
 pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParameter> {
     let dof = robot.model.dof();
     let joints: Vec<usize> = (0..dof).collect();
@@ -38,7 +38,8 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     };
     factor(Quantity::Stiffness, FREE, settings.deviation);
     factor(Quantity::Damping, FREE, settings.deviation);
-    // Slow motion contains no inertia; without a prior its logarithm would have no lower end.
+    // Slow motion does not determine the inertia of the drives; without a prior, its logarithm would not be bounded
+    // below.
     factor(Quantity::Armature, WIDE, settings.deviation);
     factor(Quantity::Coulomb, FREE, settings.friction_deviation);
     if robot.drives.iter().all(|drive| drive.torque_limit.is_finite()) {
@@ -60,7 +61,7 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     }
     sum(&mut list, joints.clone(), Quantity::Delay, settings.delay_s);
     for joint in 0..dof {
-        // The delay of a single joint is that from its command to its measurement.
+        // For a single joint, only the sum of command delay and read delay is identifiable.
         if dof > 1 {
             sum(&mut list, vec![joint], Quantity::ReadDelay, settings.read_delay_s);
         }
@@ -72,7 +73,7 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     list
 }
 
-/// One factor for equal servos; otherwise one for each joint.
+/// Adds one common factor for equal servos; otherwise one factor for each joint.
 fn common_or_own(list: &mut Vec<FreeParameter>, joints: &[usize], quantity: Quantity, alike: bool) {
     if alike {
         common(list, joints, quantity, WIDE);
@@ -93,7 +94,7 @@ fn sum(list: &mut Vec<FreeParameter>, members: Vec<usize>, quantity: Quantity, p
 
 fn body_unknowns(robot: &ServoRobot, settings: &ServoSettings, list: &mut Vec<FreeParameter>) {
     let model = &robot.model;
-    // The bodies' own size is all that a single joint has.
+    // For a robot with a single joint, only the size of the bodies is available.
     let sizes = model.inertials().iter().filter_map(|body| Some(body.com_m()?.norm()));
     let joints: f64 = model.maps().iter().map(|map| map.translation.norm()).sum();
     let reach = (joints + sizes.fold(0.0, f64::max)).max(LEAST_REACH_M);

@@ -1,4 +1,4 @@
-//! Motion of a fitted robot along recorded commands.
+//! Simulation of a fitted robot for recorded commands.
 
 use crate::error::ServoError;
 use crate::law::DriveLaw;
@@ -7,8 +7,8 @@ use crate::rollout::Rollout;
 use crate::run::Run;
 use crate::step_state::Stepping;
 
-/// Simulated positions of each joint at the stamps of a run, rad (m), from the first measured position at rest, without
-/// resets. `None` if the simulation does not give numbers.
+/// Simulated positions of each joint at the time stamps of a run, rad (m). The simulation starts at rest at the first
+/// measured position and is not reset later. `None` if the simulation diverges.
 ///
 /// # Errors
 /// A run that does not fit the robot.
@@ -16,7 +16,7 @@ pub fn simulate(robot: &ServoRobot, run: &Run, step_s: f64) -> Result<Option<Vec
     simulate_with_law(robot, run, step_s, DriveLaw::Identified)
 }
 
-/// As [`simulate`] with the steps of a simulator that computes the torque of the drives by `law`.
+/// As [`simulate`], but with the time steps of another simulator, which computes the torque of the drives by `law`.
 ///
 /// # Errors
 /// A run that does not fit the robot.
@@ -35,7 +35,7 @@ pub fn simulate_with_law(
     Ok(ended.then_some(positions))
 }
 
-/// Root mean square of the measured minus the given positions, for each joint, rad (m).
+/// Root mean square difference between the measured and the given positions of each joint, rad (m).
 pub fn errors(run: &Run, positions: &[Vec<f64>]) -> Vec<f64> {
     let error = |(measured, simulated): (&Vec<f64>, &Vec<f64>)| {
         let squares: f64 = measured.iter().zip(simulated).map(|(m, s)| (m - s).powi(2)).sum();

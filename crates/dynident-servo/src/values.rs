@@ -1,4 +1,4 @@
-//! The found values with their error bars, in units of the robot.
+//! Fitted values with their error bars, in physical units.
 
 use crate::fit::Search;
 use crate::parameters::{FreeParameter, ServoRobot, VariedRobot, robot_at, robot_value};
@@ -7,38 +7,39 @@ use dynident_model::ModelError;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// A value of a joint's drive or of a body.
+/// A fitted value of a joint's drive or of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServoValue {
     /// The quantity.
     pub quantity: Quantity,
-    /// The joint, or the body for a mass or a centre.
+    /// Index of the joint; for a mass or a centre of mass, index of the body.
     pub index: usize,
     /// The value, in the quantity's unit.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub std: f64,
-    /// Its standard deviation if the common factor of torques, inertias and masses were known.
+    /// Standard deviation of the value if the common factor of torques, inertias and masses were known.
     pub std_at_scale: f64,
-    /// Its standard deviation before the fit.
+    /// Standard deviation of the value before the fit.
     pub prior_std: f64,
 }
 
-/// The common factor of all torques, inertias and masses: positions do not contain it.
+/// The common factor of all torques, inertias and masses, which positions alone do not determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// Total mass of the moving bodies, kg.
     pub mass_kg: f64,
-    /// Standard deviation of the factor, relative.
+    /// Relative standard deviation of the factor.
     pub std: f64,
-    /// Its standard deviation before the fit, relative.
+    /// Relative standard deviation of the factor before the fit.
     pub prior_std: f64,
 }
 
-/// All values that a search could change, and the scale that they share.
+/// All values that the search could change with their error bars, and the common factor of torques, inertias and
+/// masses.
 ///
 /// # Errors
-/// Coordinates that give bodies that are not numbers.
+/// The coordinates give bodies with values that are not finite.
 pub fn values(
     nominal: &ServoRobot,
     parameters: &[FreeParameter],
@@ -90,7 +91,8 @@ pub fn values(
     Ok((list, scale))
 }
 
-/// Subtracts the mean of the read delays from all delays, as [`robot_at`] does: the motion does not contain it.
+/// Subtracts the mean of the read delays from all delays, as [`robot_at`] does, because the motion does not determine
+/// this mean.
 fn without_mean_read_delay(
     rows: &mut BTreeMap<(Quantity, usize), DVector<f64>>,
     parameters: &[FreeParameter],
@@ -111,8 +113,8 @@ fn deviation(covariance: &DMatrix<f64>, row: &DVector<f64>) -> f64 {
     row.dot(&(covariance * row)).max(0.0).sqrt()
 }
 
-/// The change of the coordinates that multiplies all torques, inertias and masses by one number: by common coordinates
-/// where they exist.
+/// Change of the coordinates that multiplies all torques, inertias and masses by the same factor. Common coordinates
+/// are used where they exist.
 fn scale_direction(parameters: &[FreeParameter], joints: usize) -> DVector<f64> {
     let is_common = |parameter: &FreeParameter| parameter.members.len() == joints && joints > 1;
     let has_common = |quantity: Quantity| parameters.iter().any(|own| own.quantity == quantity && is_common(own));
@@ -124,8 +126,8 @@ fn scale_direction(parameters: &[FreeParameter], joints: usize) -> DVector<f64> 
     DVector::from_iterator(parameters.len(), parameters.iter().map(part))
 }
 
-/// Variance of the factor of `direction` in a normal distribution: `1 / (uᵀ C⁻¹ u)`. Without it, the covariance is
-/// `C - u uᵀ / (uᵀ C⁻¹ u)`.
+/// Variance of the component along a direction u in a normal distribution with covariance C: `1 / (uᵀ C⁻¹ u)`. Without
+/// this component, the covariance is `C - u uᵀ / (uᵀ C⁻¹ u)`.
 fn variance_along(covariance: &DMatrix<f64>, direction: &DVector<f64>) -> f64 {
     let solved = covariance.clone().cholesky().map(|factor| factor.solve(direction));
     solved.map_or(0.0, |solved| direction.dot(&solved)).recip().min(f64::MAX)

@@ -1,12 +1,13 @@
-//! Selection of the cut-off with the smallest parameter error, by simulated copies of the recordings.
+//! Selection of the cut-off frequency with the smallest predicted parameter error, from simulated copies of the
+//! recordings.
 //!
-//! A low cut-off removes motion from the positions that is still in the torque (its highest frequencies, the velocity
-//! near a reversal) and leaves few rows. A high cut-off lets position noise into the regressor, differentiated twice.
-//! The spectrum of the positions alone does not show the optimum. So [copies of the
-//! recordings](simulated_copies::SimulatedCopies) are simulated: the denoised motion, the torque of a first fit for it,
-//! and noise as in the recordings. The fit with each candidate is compared with the parameters that generated the
-//! torque. This is a parametric bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, 6.5) of the
-//! error, including filter bias and noise.
+//! With a low cut-off, the low-pass on the positions removes fast motion that the torque still contains (for example
+//! the velocity change at a reversal), and few rows remain. With a high cut-off, position noise enters the regressor
+//! after two differentiations. The spectrum of the positions alone does not show the optimum. Therefore Dynident
+//! simulates [copies of the recordings](simulated_copies::SimulatedCopies): the denoised motion, the torque that a
+//! first fit predicts for this motion, and noise as in the recordings. A fit of the copies with each candidate cut-off
+//! is compared with the parameters that generated the torque. This is a parametric bootstrap (Efron and Tibshirani, *An
+//! Introduction to the Bootstrap*, 1993, 6.5) of the error, including filter bias and noise.
 
 mod read_logs;
 mod simulated_copies;
@@ -21,46 +22,47 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use simulated_copies::SimulatedCopies;
 
-/// Ratio of neighbouring candidates.
+/// Ratio of neighbouring candidate cut-offs.
 const CANDIDATE_RATIO: f64 = core::f64::consts::SQRT_2;
-/// Range of candidates: the lowest relative to the lowest cut-off of a joint's spectrum, the highest relative to the
-/// highest one. Noise can raise the cut-offs of the spectra, so the lowest candidate is not above the velocity band of
-/// any joint.
+/// Range of candidates: the lowest candidate relative to the lowest cut-off that the spectrum of a joint suggests, and
+/// the highest candidate relative to the highest of these cut-offs. The lowest candidate must not be above the velocity
+/// band of any joint, although noise can raise the cut-offs from the spectra.
 const CANDIDATE_RANGE: [f64; 2] = [0.7, 6.0];
-/// Maximum ratio of candidate to sample rate.
+/// Maximum ratio of a candidate to the sample rate.
 const MAX_SAMPLE_RATE_RATIO: f64 = 0.4;
-/// Ratio of predicted errors within which candidates are treated as equal. Copies lack unmodelled friction and
-/// elasticity, so smaller differences are not significant.
+/// Ratio of predicted errors within which candidates are treated as equally good. The simulated copies lack unmodelled
+/// friction and elasticity, so smaller differences are not significant.
 const MAX_EQUAL_ERROR_RATIO: f64 = 1.1;
 
 /// One candidate cut-off.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffCandidate {
-    /// Cut-off of the positions, hertz.
+    /// Cut-off of the low-pass on the positions, hertz.
     pub cutoff_hz: f64,
-    /// Predicted torque error of the fitted model on motion like that of the recordings: root mean square over joints,
-    /// each in percent of its torque's spread.
+    /// Predicted torque error of the fitted model on similar motion, percent: root mean square over the joints, where
+    /// each joint's error is relative to the standard deviation of its torque.
     pub predicted_error_percent: f64,
 }
 
-/// A cut-off selected by the predicted error of the parameters.
+/// A cut-off that was selected because it has the smallest predicted parameter error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffByError {
-    /// Selected cut-off, hertz. If noise still biases least squares, `auto` lowers it afterwards with its instruments
+    /// Selected cut-off, hertz. If noise still biases least squares, the estimator `auto` lowers the cut-off afterwards
     /// ([`NoiseInRegressor::cutoff_before_hz`](crate::estimators::NoiseInRegressor)).
     pub cutoff_hz: f64,
-    /// Cut-off that the position spectra suggest, hertz: twice the highest frequency of the motion. Held-out figures
-    /// use the torque below 0.7 of it, for any cut-off of the fit.
+    /// Cut-off that the position spectra suggest, hertz: twice the highest frequency of the motion. Held-out errors are
+    /// for torque below 0.7 times this frequency, for any cut-off of the fit.
     pub motion_hz: f64,
     /// All candidates, lowest first.
     pub candidates: Vec<CutoffCandidate>,
 }
 
 impl CutoffByError {
-    /// The highest cut-off with nearly the smallest error, hertz. It is best for friction, whose details lie above the
-    /// band of the motion.
+    /// The highest cut-off whose predicted error is nearly as small as the smallest one, hertz. This cut-off is best
+    /// for the selection of friction, because fast changes of friction at reversals are above the frequency band of the
+    /// motion.
     pub fn highest_alike_hz(&self) -> f64 {
         let errors = || self.candidates.iter().map(|candidate| candidate.predicted_error_percent);
         let least = errors().fold(f64::INFINITY, f64::min);
@@ -72,11 +74,12 @@ impl CutoffByError {
     }
 }
 
-/// Compares cut-offs on simulated copies of the recordings `training` and returns the best one. `None` if the cut-off
-/// is stated, or if the recordings are too short for a copy.
+/// Compares cut-offs on simulated copies of the recordings `training` and returns the best one. `None` if the settings
+/// state the cut-off, or if the recordings are too short for a copy.
 ///
-/// The error of a candidate is that of the torque `W (θ̂ - θ)`, each joint in units of its torque's spread, over motion
-/// that was not used for the fit: the denoised motion with each joint at another time. Recordings with a payload are
+/// The error of a candidate is the torque `W (θ̂ - θ)`: regressor W, fitted parameters θ̂ and true parameters θ of the
+/// copy. Each joint's error is divided by the standard deviation of its torque. The error is evaluated on motion that
+/// was not used for the fit: the denoised motion with each joint shifted by another time. Recordings with a payload are
 /// skipped.
 ///
 /// # Errors
@@ -102,7 +105,7 @@ pub fn choose_cutoff(
         return Ok(None);
     };
     let highest = highest.min(MAX_SAMPLE_RATE_RATIO * simulated_copies.log_rate_hz());
-    // The cut-off of the first fit is among the candidates.
+    // The candidates include the cut-off of the first fit.
     let below = ((motion_hz / lowest).ln() / CANDIDATE_RATIO.ln()).floor() as i32;
     let above = ((highest / motion_hz).ln() / CANDIDATE_RATIO.ln()).floor() as i32;
     let ladder: Vec<f64> = (-below..=above).map(|step| motion_hz * CANDIDATE_RATIO.powi(step)).collect();
@@ -129,7 +132,8 @@ pub fn choose_cutoff(
         })
         .collect();
     let least = candidates.iter().map(|candidate| candidate.predicted_error_percent).fold(f64::INFINITY, f64::min);
-    // Among equal candidates prefer the cut-off of the spectra, otherwise the lowest one, which passes the least noise.
+    // Among equally good candidates, prefer the cut-off from the spectra; otherwise the lowest one, which passes the
+    // least noise.
     let mut alike =
         candidates.iter().filter(|candidate| candidate.predicted_error_percent <= MAX_EQUAL_ERROR_RATIO * least);
     let lowest = alike.clone().next();

@@ -9,10 +9,11 @@ use dynident_recording::{
 };
 use dynident_rows::{LogError, LogSpectrum, Logs, RegressorModel, Samples};
 
-/// Sample rate of the copy, in units of the highest candidate.
+/// Sample rate of a simulated copy, relative to the highest candidate cut-off.
 const RATE_RATIO: f64 = 4.0;
 
-/// A separate low-pass for each joint, at the frequency where its motion disappears in the noise.
+/// A separate low-pass for each joint. Its cut-off is the frequency at which the motion of the joint disappears in the
+/// noise.
 #[derive(Debug)]
 pub(super) struct JointByJoint(pub(super) Vec<ButterworthZeroPhase>);
 
@@ -34,7 +35,7 @@ impl Differentiator for JointByJoint {
     }
 }
 
-/// Denoised motion and torque of the recordings read up to now, decimated.
+/// Denoised and decimated motion and torque of the recordings read so far.
 pub(super) struct ReadLogs {
     highest_hz: f64,
     /// Rate of the first log, hertz; logs with another rate are skipped.
@@ -42,7 +43,7 @@ pub(super) struct ReadLogs {
     pub(super) thinning: usize,
     pub(super) blocks: Vec<MotionBlock>,
     pub(super) noise_squares: Vec<f64>,
-    /// Highest frequency at which each joint's motion disappears in the noise, hertz.
+    /// For each joint, the frequency at which its motion disappears in the noise, hertz; the highest one of all logs.
     pub(super) reference_hz: Vec<f64>,
     pub(super) used: u64,
     pub(super) total: u64,
@@ -98,7 +99,7 @@ impl ReadLogs {
         if logs.execution.parallel() {
             stream = stream.read_beside();
         }
-        // Only the torque needs a filter; decimation does not change the denoised motion.
+        // Only the torque needs a filter; decimation without a filter does not distort the denoised motion.
         let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
         let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
         let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);

@@ -1,4 +1,4 @@
-//! Simulated copies of recordings: their denoised motion, the torque of a first fit, and their noise.
+//! Simulated copies of recordings: denoised motion, torque that a first fit predicts, and noise as in the recordings.
 
 use super::read_logs::{JointByJoint, ReadLogs};
 use crate::error::IdentificationError;
@@ -14,49 +14,51 @@ use dynident_rows::{
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-/// Maximum number of samples of all pieces; enough to compare errors, within milliseconds.
+/// Maximum number of samples of all pieces. It is enough to compare errors and takes milliseconds.
 const MAX_SAMPLES: usize = 4096;
 const COPIES: usize = 4;
 /// Minimum length of a piece, samples.
 const MIN_PIECE_SAMPLES: usize = 32;
-/// For each copy the shift of the torque noise, relative to the length of a piece.
+/// For each copy, the time shift of the torque noise, relative to the length of a piece.
 const NOISE_SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
-/// Minimum share of the torque noise's power that is kept if the position noise seems to explain all of it.
+/// Minimum share of the torque noise's power that remains after the effect of position noise is subtracted.
 const MIN_NOISE_SHARE: f64 = 1.0e-4;
-/// Length of the end effects, in periods of the slowest cut-off.
+/// Length of the end effects of filters that are removed, in periods of the lowest cut-off.
 const END_EFFECT_PERIODS: f64 = 1.5;
 const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
 const SEED: u64 = 0x005E_ED0F_7157;
 
 struct Piece {
-    /// Denoised motion with the torque of the first fit.
+    /// Denoised motion, with the torque that the first fit predicts.
     motion: MotionBlock,
     noise: Vec<f64>,
 }
 
-/// Measurements of a piece in one copy, joint-major.
+/// Simulated measurements of a piece in one copy, joint after joint.
 struct Measured {
     q: Vec<f64>,
     tau: Vec<f64>,
 }
 
-/// Motion and noise of the recordings, with known parameters.
+/// Denoised motion and noise of the recordings, with the parameters that generate the torque of the copies.
 pub(super) struct SimulatedCopies {
     pieces: Vec<Piece>,
     copies: Vec<Vec<Measured>>,
-    /// For each joint `WᵀW` over the same motions with each joint at another time (combinations of postures and
-    /// velocities that were not used for the fit), in units of the torque's spread; `None` for a joint without torque.
+    /// For each joint, `WᵀW` of motion that was not used for the fit, divided by the variance of the joint's torque.
+    /// The motion consists of the same motions with each joint shifted by another time, which gives other combinations
+    /// of postures and velocities. `None` for a joint without torque.
     unseen: Vec<Option<DMatrix<f64>>>,
     theta: Vec<f64>,
     position_noise: Vec<f64>,
-    /// Factor on the torque noise, so that a part of the recordings is as uncertain as the whole.
+    /// Factor on the torque noise. With it, the fit to the selected pieces is as uncertain as a fit to the complete
+    /// recordings.
     scale: f64,
     log_rate_hz: f64,
     thinning: usize,
 }
 
 impl SimulatedCopies {
-    /// Reads the recordings and makes the first fit; `highest_hz` is the highest candidate.
+    /// Reads the recordings and computes the first fit. `highest_hz` is the highest candidate cut-off.
     pub(super) fn of(
         logs: &Logs<'_>,
         settings: &IdentificationSettings,
@@ -73,7 +75,7 @@ impl SimulatedCopies {
             read.take(logs, &settings.motion, model, log, most)?;
         }
         let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, total, .. } = read;
-        // The filters of the reference extrapolate beyond the ends.
+        // Beyond the ends of a log, these low-pass filters extrapolate, so a margin is removed.
         let slowest_hz = reference_hz.iter().copied().fold(f64::INFINITY, f64::min);
         let ends = (END_EFFECT_PERIODS * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
         let measured: Vec<MotionBlock> =
@@ -83,7 +85,7 @@ impl SimulatedCopies {
         }
         let fitted = Self::fitted(logs, settings, model, measured, log_rate_hz, thinning)?;
         let Some(mut simulated) = fitted else { return Ok(None) };
-        // The log's white noise after the low-pass.
+        // White noise of the log after the low-pass of the decimation.
         simulated.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
         simulated.scale = (used as f64 / total as f64).sqrt();
         let rate_hz = log_rate_hz / thinning as f64;
@@ -96,12 +98,12 @@ impl SimulatedCopies {
         Ok(Some(simulated))
     }
 
-    /// Removes the effect of position noise from the torque noise: the residual of the first fit contains it, and every
-    /// copy adds new position noise.
+    /// Subtracts the effect of position noise from the torque noise. The residual of the first fit contains this
+    /// effect, and every copy adds new position noise.
     fn take_motion_noise(&mut self, model: &RegressorModel, reference: &JointByJoint) -> Result<(), LogError> {
         let (mut all, mut of_motion) = (vec![0.0_f64; model.dof()], vec![0.0_f64; model.dof()]);
         for (number, piece) in self.pieces.iter().enumerate() {
-            // Use the same filter for both, so that its end effects cancel.
+            // The same filter is used for both motions, so that its end effects cancel.
             let seed = SEED ^ !(number as u64);
             let of = |q: &[f64]| differentiated(&piece.motion, q, reference);
             let noisy = of(&self.noisy_positions(piece, seed));
@@ -129,14 +131,14 @@ impl SimulatedCopies {
         Ok(())
     }
 
-    /// Positions of a piece with new noise.
+    /// Positions of a piece with newly simulated noise.
     fn noisy_positions(&self, piece: &Piece, seed: u64) -> Vec<f64> {
         let mut random = Random::new(seed);
         let joints = piece.motion.q.chunks_exact(piece.motion.rows).zip(&self.position_noise);
         joints.flat_map(|(q, noise)| q.iter().map(|q| q + noise * random.normal()).collect::<Vec<_>>()).collect()
     }
 
-    /// Copy `copy` of all pieces: new position noise, shifted torque noise.
+    /// Measurements of all pieces in copy number `copy`: new position noise, and the torque noise shifted in time.
     fn measured(&self, copy: usize) -> Vec<Measured> {
         let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
         let one = |(number, piece): (usize, &Piece)| {
@@ -180,7 +182,7 @@ impl SimulatedCopies {
             let torque = torque(model, &block, &theta)?;
             let mut noise: Vec<f64> =
                 block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
-            // The noise of invalid torque samples is unknown; the copies mask them as the fit does.
+            // The noise of invalid torque samples is unknown. The copies exclude these samples, as the fit does.
             noise
                 .iter_mut()
                 .zip(&block.set_aside)
@@ -202,7 +204,7 @@ impl SimulatedCopies {
         self.thinning
     }
 
-    /// The differentiated copies for this cut-off; `None` for a copy to which the filter is not applicable.
+    /// The copies, differentiated with this cut-off; `None` for a copy to which the filter cannot be applied.
     pub(super) fn copies(
         &self,
         settings: &MotionSettings,
@@ -218,8 +220,9 @@ impl SimulatedCopies {
         }))
     }
 
-    /// Mean square over joints of the difference between the torques of parameters `values` and of the first fit, on
-    /// denoised motion that was not used for the fit, each in units of its spread.
+    /// Mean square over the joints of the difference between two torques: with the parameters `values` and with the
+    /// parameters of the first fit, both on denoised motion that was not used for the fit. Each joint is divided by the
+    /// standard deviation of its torque.
     pub(super) fn square_error(&self, model: &RegressorModel, values: &[f64]) -> f64 {
         let of_joint = |(joint, squares): (usize, &Option<DMatrix<f64>>)| {
             let columns = model.layout().joint_columns(joint).iter();
@@ -232,7 +235,8 @@ impl SimulatedCopies {
     }
 }
 
-/// A motion with positions `q` (joint-major) and their derivatives; `None` if the differentiator is not applicable.
+/// A motion with the positions `q` (joint after joint) and their derivatives; `None` if the differentiator cannot be
+/// applied.
 fn differentiated(motion: &MotionBlock, q: &[f64], differentiator: &dyn Differentiator) -> Option<MotionBlock> {
     let (rows, mut block) = (motion.rows, motion.clone());
     for (joint, q) in q.chunks_exact(rows).enumerate() {
@@ -251,12 +255,12 @@ fn inside(motion: &MotionBlock, ends: usize) -> MotionBlock {
     motion.part(ends..motion.rows - ends)
 }
 
-/// The same motion with each joint shifted cyclically in time.
+/// The same motion with each joint shifted cyclically by another time.
 fn shifted(motion: &MotionBlock) -> MotionBlock {
     let mut other = motion.clone();
     for joint in 0..motion.joints {
         let own = joint * motion.rows..(joint + 1) * motion.rows;
-        // Multiples of the golden ratio's fraction, so that no two joints have the same shift.
+        // Multiples of the golden ratio's fractional part, so that no two joints have the same shift.
         let shift = ((GOLDEN_RATIO * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
         for values in [&mut other.q, &mut other.dq, &mut other.ddq] {
             values[own.clone()].rotate_left(shift);
@@ -309,7 +313,7 @@ fn every_sample(model: &RegressorModel, block: &MotionBlock, consumer: &mut dyn 
     RowBuilder::new(model, &places, block.rate_hz, None).map_err(in_filter)?.take(block, consumer)
 }
 
-/// Torque of the base parameters `theta` on a motion, joint-major.
+/// Torque that the base parameters `theta` predict for a motion, joint after joint.
 fn torque(model: &RegressorModel, block: &MotionBlock, theta: &[f64]) -> Result<Vec<f64>, LogError> {
     struct Predicted<'a> {
         model: &'a RegressorModel,

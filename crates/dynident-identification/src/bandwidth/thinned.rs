@@ -3,7 +3,7 @@
 use dynident_recording::{Decimator, MotionBlock};
 use dynident_rows::{LogError, set_aside};
 
-/// Decimated blocks of a log by piece, joints in the order of the model.
+/// Decimated blocks of a log, piece by piece, joints in the order of the model.
 #[derive(Default)]
 pub(super) struct Thinned {
     thinning: usize,
@@ -12,19 +12,19 @@ pub(super) struct Thinned {
     segment: Option<usize>,
     decimators: Vec<Decimator>,
     columns: [Vec<Vec<f64>>; 4],
-    /// Marks of invalid torque by joint; empty if all torques of the piece are valid.
+    /// For each joint and sample, whether the torque is invalid; empty if all torques of the piece are valid.
     left_out: Vec<Vec<bool>>,
     out: Vec<f64>,
     rate_hz: f64,
 }
 
 impl Thinned {
-    /// For a log of `dof` joints with decimation factor `thinning`.
+    /// Creates the storage for a log of `dof` joints with the decimation factor `thinning`.
     pub(super) fn new(thinning: usize, dof: usize) -> Self {
         Self { thinning, dof, ..Self::default() }
     }
 
-    /// Takes the first `rows` of a block; `decimator` builds the filter of one joint's torque.
+    /// Adds the first `rows` rows of a block; `decimator` creates the filter for one joint's torque.
     pub(super) fn take(
         &mut self,
         block: &MotionBlock,
@@ -63,7 +63,7 @@ impl Thinned {
         let thinned = |columns: &[Vec<f64>]| -> Vec<f64> {
             columns.iter().flat_map(|x| (0..rows).map(|row| x[first + row * self.thinning])).collect()
         };
-        // A sample represents those nearest to it and is valid if at least half of them are.
+        // A decimated sample represents the samples nearest to it. It is valid if at least half of these are valid.
         let (half, all) = (self.thinning / 2, self.columns[0].first().map_or(0, Vec::len));
         let counts_not = |left_out: &[bool], row: usize| {
             let centre = first + row * self.thinning;

@@ -1,4 +1,4 @@
-//! Uncertainty of written bodies, averaged over explanations of the difference from the description.
+//! Uncertainty of the exported bodies, averaged over explanations of the differences from the robot description.
 
 use super::differences::Differences;
 use super::parts::Part;
@@ -6,24 +6,26 @@ use dynident_estimation::changes::Explanation;
 use dynident_estimation::{HALF_WIDTH_95, normal_below};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Probability below which an explanation is left out of the mean.
+/// Probability below which an explanation is omitted from the average.
 const MIN_PROBABILITY: f64 = 1e-3;
 
-/// Halvings of the interval that contains a half width: the error is then below 1e-9 of its upper limit.
+/// Number of bisections of the interval that contains a half-width. The error is then below 1e-9 of its upper limit.
 const HALVINGS: usize = 30;
 
-/// Distribution of the error of written bodies.
+/// Probability distribution of the error of the exported bodies.
 #[derive(Clone, Debug)]
 pub struct BodyUncertainty {
-    /// `E[(π̂ − π)(π̂ − π)ᵀ]` of all parameters of the bodies, ten for each.
+    /// Mean square error `E[(π̂ − π)(π̂ − π)ᵀ]` of all inertial parameters π, ten for each body; π̂ are the exported
+    /// values.
     pub mean_square: DMatrix<f64>,
-    /// Probability, mean and standard deviations of the error under each explanation.
+    /// For each explanation its probability, and the mean and standard deviations of the error if the explanation is
+    /// true.
     normals: Vec<(f64, DVector<f64>, DVector<f64>)>,
 }
 
 impl BodyUncertainty {
-    /// Half width of the 95 % interval of each parameter about its written value, divided by 1.96. An improbable
-    /// explanation with a large change has little effect on it, but dominates the mean square.
+    /// Half-width of the 95 % interval of each parameter around its exported value, divided by 1.96. An improbable
+    /// explanation with a large change has little effect on the half-width, although it dominates the mean square.
     pub fn std(&self) -> Vec<f64> {
         let count = self.mean_square.nrows();
         let of = |k: usize| self.normals.iter().map(move |(share, mean, std)| (*share, mean[k], std[k]));
@@ -31,12 +33,12 @@ impl BodyUncertainty {
     }
 }
 
-/// Half width h of the interval about zero that contains 95 % of a mixture of normal distributions, each with its
-/// share, mean and standard deviation: `Σ p (Φ((h − μ)/σ) − Φ((−h − μ)/σ)) = 0.95`.
+/// Half-width h of the interval around zero that contains 95 % of a mixture of normal distributions. Each has its share
+/// p, mean μ and standard deviation σ: `Σ p (Φ((h − μ)/σ) − Φ((−h − μ)/σ)) = 0.95`.
 fn half_width_95(normals: &[(f64, f64, f64)]) -> f64 {
     let inside = |h: f64| -> f64 {
         let of = |(share, mean, std): &(f64, f64, f64)| {
-            // A parameter without uncertainty.
+            // A parameter without uncertainty has a step at its value.
             if *std == 0.0 {
                 if mean.abs() <= h { *share } else { 0.0 }
             } else {
@@ -54,16 +56,17 @@ fn half_width_95(normals: &[(f64, f64, f64)]) -> f64 {
 }
 
 impl Differences {
-    /// Distribution of the error of the written bodies `π̂`, whose nominal values are `nominal`. Under each
-    /// explanation e the parameters are normally distributed with mean `μ_e` and covariance `Σ_e`:
+    /// Distribution of the error of the exported bodies `π̂` (`written`), whose values in the robot description are
+    /// `nominal`. If explanation e is true, the parameters are normally distributed with mean `μ_e` and covariance
+    /// `Σ_e`:
     ///
     /// ```text
     /// Π_e = P_e + s_e² Σ U Uᵀ,   K = Π_e Eᵀ (E Π_e Eᵀ + c_e² C)⁻¹,   μ_e = π₀ + K d,   Σ_e = Π_e − K E Π_e
     /// E[(π̂ − π)(π̂ − π)ᵀ] = Σ_e p_e (Σ_e + (π̂ − μ_e)(π̂ − μ_e)ᵀ)
     /// ```
     ///
-    /// P_e is the covariance of the differences of all bodies ([`SPREADS`](super::SPREADS)), so a description that the
-    /// logs contradict widens the bars. `None` if a matrix is singular.
+    /// P_e is the covariance of the differences of all bodies from the description ([`SPREADS`](super::SPREADS)). If
+    /// the logs contradict the description, P_e and the error bars are larger. `None` if a matrix is singular.
     pub fn uncertainty(&self, written: &[f64], nominal: &[f64]) -> Option<BodyUncertainty> {
         let count = self.effects.ncols();
         let written = DVector::from_fn(count, |k, _| written[k] - nominal[k]);
@@ -84,7 +87,7 @@ impl Differences {
         mean_square.iter().all(|value| value.is_finite()).then_some(BodyUncertainty { mean_square, normals })
     }
 
-    /// Mean and covariance of the difference of all bodies from the description under an explanation.
+    /// Mean and covariance of the difference of all bodies from the description if an explanation is true.
     fn posterior(&self, explanation: &Explanation) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut prior = self.spreads[explanation.covariance].clone();
         for &group in &explanation.groups {
@@ -97,7 +100,7 @@ impl Differences {
         let square = explanation.error_factor * explanation.error_factor;
         let of_data = &self.effects * &prior;
         let total = &of_data * self.effects.transpose() + &self.covariance * square;
-        // In units of each parameter, so that friction and inertia have the same size.
+        // Each parameter is scaled, so that friction and inertia have similar sizes.
         let scale = total.diagonal().map(|value| value.max(f64::MIN_POSITIVE).sqrt().recip());
         let scales = DMatrix::from_diagonal(&scale);
         let factor = Cholesky::new(&scales * total * &scales)?;

@@ -17,18 +17,19 @@ const SMALL_PROBABILITY: f64 = 0.5;
 /// usually of the same robot, whose bodies did not change.
 const OTHER_ROBOT_PROBABILITY: f64 = 0.05;
 
-/// Expected common factor of all values of a body that changed, minus 1.
+/// Expected value of the common factor of a changed body, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
 
 /// Prior probability of a change of terms, and of each of the two ways in which a body changes: a load, or a common
 /// factor of all its values.
 const CHANGE_PROBABILITY: f64 = 0.025;
 
-/// Expected difference of a term relative to its value: descriptions do not contain the friction of the real drive.
+/// Expected difference of a friction or drive parameter relative to its value. It is large because robot descriptions
+/// do not contain the friction of the real drive.
 const UNKNOWN_TERM_RATIO: f64 = 50.0;
 
-/// Smaller differences of the other bodies are preferred if their probability is at least this part of the largest one:
-/// a description is usually right.
+/// Among explanations with the same changed bodies, smaller differences of the other bodies are preferred if their
+/// probability is at least this share of the largest one, because descriptions are usually right.
 const MIN_SHARE_OF_LARGEST: f64 = 0.1;
 
 /// Explanations of the difference between an estimate and the description of its robot, or between two estimates.
@@ -41,11 +42,11 @@ pub struct Differences {
     pub(super) parts: Vec<Part>,
     /// Change of the values of the part per unknown of each group; for a body, its ten inertial parameters.
     pub(super) unknowns: Vec<DMatrix<f64>>,
-    /// Base parameters that are compared: their difference from the description.
+    /// Difference of the compared base parameters from the description.
     pub(super) difference: DVector<f64>,
-    /// Covariance of their estimate, with unknown terms.
+    /// Covariance of the estimates of these base parameters; it treats friction and drive parameters as unknown.
     pub(super) covariance: DMatrix<f64>,
-    /// `E`: effect of all parameters of the bodies on them.
+    /// Matrix E: effect of all inertial parameters on the compared base parameters.
     pub(super) effects: DMatrix<f64>,
     /// Sizes of the differences of all bodies that are compared.
     pub(super) sizes: Vec<Spread>,
@@ -56,7 +57,7 @@ pub struct Differences {
 impl Differences {
     /// Compares base parameters `values` with indices `rows` and their `covariance` with the nominal values of `robot`.
     /// Friction, offsets and drive inertia are unknown in a description and are not tested. `None` without nominal
-    /// values, or if the settings define single bodies, which are then not those of the description.
+    /// values, or if the settings define single bodies, so that these are not the bodies of the description.
     ///
     /// # Errors
     /// As [`explanations`].
@@ -165,7 +166,7 @@ impl Differences {
         self.explanations.iter().map(|own| value(&self.sizes[own.covariance])).collect()
     }
 
-    /// Multiplies the probability of each explanation by a factor; at least one must be positive.
+    /// Multiplies the probability of each explanation by a factor. At least one factor must be positive.
     pub(super) fn reweight(&mut self, factors: &[f64]) {
         for (own, factor) in self.explanations.iter_mut().zip(factors) {
             own.probability *= factor;
@@ -177,25 +178,26 @@ impl Differences {
         self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
-    /// Probability that every body differs by more than the small differences of `limits`, and none differs by more
-    /// than the others.
+    /// Probability that every body differs from the description by more than the small differences of `limits`, and
+    /// that no body differs by more than the others.
     pub fn everywhere(&self, limits: &DescriptionThresholds) -> f64 {
         let all = self.explanations.iter().filter(|own| self.is_everywhere(own, limits));
         all.map(|own| own.probability).sum::<f64>().min(1.0)
     }
 
-    /// `dᵀ C⁻¹ d` of the difference from the description, with unknown terms.
+    /// Test statistic `dᵀ C⁻¹ d` of the difference d from the description with its covariance C; friction and drive
+    /// parameters are treated as unknown.
     pub fn chi_squared(&self) -> f64 {
         let scale = self.covariance.diagonal().map(|value| value.max(f64::MIN_POSITIVE).sqrt().recip());
         let scales = DMatrix::from_diagonal(&scale);
         let scaled = &scales * &self.difference;
-        // Rounding of strong correlations must not make the matrix indefinite.
+        // For strong correlations, rounding could otherwise make the matrix indefinite.
         let rounding = DMatrix::from_diagonal_element(scale.len(), scale.len(), 1e-9);
         let factor = (&scales * &self.covariance * &scales + rounding).cholesky();
         factor.map_or(0.0, |factor| scaled.dot(&factor.solve(&scaled)))
     }
 
-    /// [`Explanation::remaining`] of the most probable explanation by all bodies; 1 without any.
+    /// [`Explanation::remaining`] of the most probable explanation by all bodies; 1 if there is none.
     pub fn remaining_everywhere(&self, limits: &DescriptionThresholds) -> f64 {
         let best = self.explanations.iter().find(|own| self.is_everywhere(own, limits));
         best.map_or(1.0, |own| own.remaining)
@@ -214,7 +216,7 @@ impl Differences {
         self.parts_of(explanation).into_iter().filter_map(|part| part.body()).collect()
     }
 
-    /// Change of the ten values of a body under an explanation, with its covariance.
+    /// Change of the ten values of a body according to an explanation, with its covariance.
     pub fn change_of(&self, explanation: &Explanation, body: usize) -> (DVector<f64>, DMatrix<f64>) {
         let (mut change, mut covariance) = (DVector::zeros(10), DMatrix::zeros(10, 10));
         for (&group, (values, own)) in explanation.groups.iter().zip(&explanation.changes) {
@@ -250,10 +252,10 @@ impl Differences {
         sets.into_iter().map(|(total, _, chosen)| (total, chosen)).collect()
     }
 
-    /// The explanation by one or two bodies that the written model follows: the most probable one, if the evidence for
+    /// The explanation by one or two bodies that the exported model follows: the most probable one, if the evidence for
     /// such explanations reaches the threshold of `limits`.
     pub fn followed(&self, limits: &DescriptionThresholds) -> Option<&Explanation> {
-        // The other bodies differ at most by small differences: otherwise they cannot keep the description.
+        // The other bodies must differ at most by small differences, because they keep the values of the description.
         let is_small = |own: &&Explanation| self.sizes[own.covariance].largest() <= limits.max_small_share;
         let few = self.explanations.iter().filter(is_small).filter(|own| !own.groups.is_empty());
         let few: f64 = few.map(|own| own.probability).sum();
@@ -267,7 +269,8 @@ impl Differences {
         large && self.bodies_of(explanation).is_empty()
     }
 
-    /// Probability that a body changed: the sum over explanations by few bodies with it, and those by all bodies.
+    /// Probability that a body changed: the sum over the explanations by few bodies that contain this body, and the
+    /// explanations by all bodies.
     pub fn body_probability(&self, body: usize, limits: &DescriptionThresholds) -> f64 {
         let changed = |own: &&Explanation| self.is_everywhere(own, limits) || self.bodies_of(own).contains(&body);
         let sum: f64 = self.explanations.iter().filter(changed).map(|own| own.probability).sum();

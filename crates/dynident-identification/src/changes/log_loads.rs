@@ -1,4 +1,4 @@
-//! A load that only one of several training logs carries.
+//! Detection of a load that only one of several training logs carries.
 
 use super::parts::{Part, parts};
 use crate::between_logs::{fit_alone, fit_without};
@@ -7,31 +7,32 @@ use dynident_estimation::changes::{ChangeSettings, explanations};
 use dynident_estimation::{Estimate, EstimationError, WeightedSettings, weighted_least_squares};
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest probability of all explanations with the body.
+/// Minimum probability of all explanations that contain the body, for a load to be reported.
 const MIN_PROBABILITY: f64 = 0.95;
 
-/// Smallest mass of a load in its standard deviations.
+/// Minimum mass of a load divided by its standard deviation, for the load to be reported.
 const MIN_DEVIATIONS: f64 = 5.0;
 
-/// A load that one training log carries and the others do not.
+/// A load that one training log carries and the other training logs do not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogLoad {
-    /// Number of the recording.
+    /// Index of the recording.
     pub log: usize,
     /// Index of the body.
     pub body: usize,
-    /// Mass, kg.
+    /// Mass of the load, kg.
     pub mass_kg: f64,
     /// Standard deviation of the mass, kg.
     pub mass_std_kg: f64,
-    /// Centre of mass in the frame of the body, m.
+    /// Centre of mass of the load in the frame of the body, m.
     pub com_m: [f64; 3],
     /// Probability that the body differs between the logs.
     pub probability: f64,
 }
 
-/// Loads of single training logs: for each log, explanations of the difference between the fit to this log and the fit
-/// to the others, from their factors. Empty for a single log, and if the study declares payloads.
+/// Finds loads of single training logs. For each log, it compares explanations of the difference between the fit to
+/// this log and the fit to the other logs, which are computed from triangular factors. Empty for a single log, and if
+/// the study declares payloads.
 ///
 /// # Errors
 /// As [`weighted_least_squares`] and [`explanations`].
@@ -48,7 +49,7 @@ pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Res
     }
     let all = weighted_least_squares(problem, settings)?;
     let mut found: Vec<LogLoad> = Vec::new();
-    // The difference of two logs is the same for both.
+    // With two logs, both comparisons give the same difference.
     let tested = if logs.len() == 2 { 1 } else { logs.len() };
     for log in 0..tested {
         // A log that does not determine the parameters alone cannot be tested.
@@ -68,7 +69,8 @@ pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Res
     Ok(found)
 }
 
-/// The load by which `own` differs from `others`; negative if the others have it.
+/// The load that explains the difference between the fits `own` and `others`; its mass is negative if the other logs
+/// carry the load.
 fn load_between(training: &Training, own: &Estimate, others: &Estimate) -> Result<Option<LogLoad>, EstimationError> {
     let robot = &training.model.parametric;
     let base = robot.base();

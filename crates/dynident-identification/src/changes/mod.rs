@@ -1,4 +1,4 @@
-//! Which parts of a robot differ from its description, or between two results.
+//! Statistical test of which parts of a robot differ from its description, or between two results.
 //!
 //! [`parts`] lists the parts with their effect on the base parameters. [`Differences`] compares explanations of the
 //! difference from the robot description or between two estimates: nothing, one or two parts, or small or large

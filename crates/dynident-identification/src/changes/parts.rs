@@ -6,15 +6,15 @@ use dynident_model::terms::{JointProperty, TorqueTerm};
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Expected change of a mass: share of the body's own mass, and of the mass of the robot. A tool has a few percent of
-/// the mass of its robot.
+/// Expected change of a body's mass: a share of the mass of the body, and a share of the mass of the robot. A tool has
+/// a few percent of the mass of its robot.
 const BODY_SHARE: f64 = 0.3;
 const ROBOT_SHARE: f64 = 0.03;
 
-/// Expected change of a term, relative to its value.
+/// Expected change of a friction or drive parameter, relative to its value.
 const TERM_SHARE: f64 = 0.5;
 
-/// A part of the robot: a body, or terms of joints.
+/// A part of the robot that may have changed: a body, or friction and drive terms of joints.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     /// Body with this index.
@@ -45,19 +45,19 @@ impl Part {
     }
 }
 
-/// Parts, effects and expected sizes for the base parameters `rows` of a robot.
+/// Parts of a robot, their effects on the base parameters `rows`, and their expected changes.
 #[allow(clippy::struct_field_names, reason = "one entry for each part in every list")]
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     /// The parts with an effect on these base parameters.
     pub parts: Vec<Part>,
-    /// Effect of each part.
+    /// Effect of each part on the base parameters.
     pub groups: Vec<ChangeGroup>,
-    /// Expected sizes of the unknowns of each group, in the units of the parameters.
+    /// Expected change of the unknowns of each group, in the units of the parameters.
     pub sizes: Vec<DVector<f64>>,
 }
 
-/// `θ = E π`: all base parameters from all parameters.
+/// Matrix E of `θ = E π`: base parameters θ from all parameters π.
 pub(super) fn effects(base: &BaseParameters) -> DMatrix<f64> {
     let (independent, dependent, regrouping) = (base.independent(), base.dependent(), base.regrouping());
     let mut all = DMatrix::zeros(independent.len(), base.all_columns().len());
@@ -124,8 +124,8 @@ pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], values: &[f64
     found
 }
 
-/// Expected change of mass (kg) and its distance from the origin of the body (m): that of the centre of mass plus the
-/// radius of gyration.
+/// Expected change of the mass of a body (kg), and its expected distance from the origin of the body frame (m): the
+/// distance of the centre of mass plus the radius of gyration.
 fn expected_change(model: &Model, body: usize, total_kg: f64) -> [f64; 2] {
     let inertial = &model.inertials()[body];
     let own = inertial.mass_kg().max(0.0);
@@ -138,6 +138,6 @@ fn expected_change(model: &Model, body: usize, total_kg: f64) -> [f64; 2] {
     } else {
         0.0
     };
-    // A tool is about a tenth of its arm long.
+    // The length of a tool is about a tenth of the length of its arm.
     [mass.max(1e-6), length.max(0.1 * arm_m).max(1e-3)]
 }

@@ -1,4 +1,4 @@
-//! Explanations in which a body would have a negative mass.
+//! Correction for explanations in which a body would have a negative mass.
 
 use super::differences::Differences;
 use super::parts::Part;
@@ -6,16 +6,16 @@ use dynident_estimation::changes::Explanation;
 use dynident_estimation::normal_below;
 
 impl Differences {
-    /// Conditions the probabilities on positive masses of the bodies that an explanation names. The evidence of
-    /// normally distributed changes does not know that a body of 0.3 kg cannot lose 1 kg. Given m > 0 for each of these
-    /// bodies, the evidence of explanation e is multiplied by
+    /// Conditions the probabilities on positive masses of the bodies that an explanation names. The changes are assumed
+    /// normally distributed, which does not exclude that a body of 0.3 kg loses 1 kg. With the condition that the mass
+    /// m of each of these bodies is positive, the evidence of explanation e is multiplied by
     ///
     /// ```text
     /// Π P_e(m > 0 | d) / P_e(m > 0)
     /// ```
     ///
-    /// (Gelfand, Smith and Lee, JASA 87 (1992) 523, section 2). `nominal` are the parameters of all bodies in the
-    /// description, ten for each.
+    /// (Gelfand, Smith and Lee, JASA 87 (1992) 523, section 2). `nominal` contains the inertial parameters of all
+    /// bodies in the description, ten for each.
     pub(super) fn exclude_negative_masses(&mut self, nominal: &[f64]) {
         // Explanations without named bodies keep their factor 1.
         let factors: Vec<f64> = self.explanations.iter().map(|own| self.positive_factor(own, nominal)).collect();

@@ -3,18 +3,19 @@
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
-/// Differences that all bodies have.
+/// Assumed size of the differences between all bodies and their description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// Relative standard deviation of a body in each direction: of its mass, its inertia, and its extent for the centre
-    /// of mass.
+    /// Relative standard deviation of a body in each independent direction: of its mass, of its inertia, and of its
+    /// centre of mass in units of the extent of the body.
     pub shape: f64,
-    /// Relative standard deviation of a common factor of all ten values of a body, as a wrong density causes.
+    /// Relative standard deviation of a common factor on all ten values of a body. A wrong density causes such a
+    /// factor.
     pub scale: f64,
 }
 
 impl Spread {
-    /// The larger of both deviations.
+    /// The larger of both standard deviations.
     pub fn largest(self) -> f64 {
         self.shape.max(self.scale)
     }
@@ -30,11 +31,11 @@ impl Spread {
     }
 }
 
-/// Sizes of differences of all bodies: rounding of a description, tolerances of manufacturing, wrong densities, and
-/// descriptions that are only rough. A common factor may be large while the shape is exact: otherwise single bodies
-/// would explain densities that are wrong in every body. Neighbouring sizes of large differences have a ratio of 1.7,
-/// less than the uncertainty of a deviation that seven bodies determine: with a ratio of 3, bars were too narrow or too
-/// wide for the sizes between.
+/// Compared sizes of the differences of all bodies: rounding of a description, tolerances of manufacturing, wrong
+/// densities, and rough descriptions. The common factor may be large while the shape is exact. Otherwise densities that
+/// are wrong in all bodies would be attributed to single bodies. Neighbouring large sizes have a ratio of 1.7, which is
+/// less than the uncertainty of a standard deviation that seven bodies determine. With a ratio of 3, error bars were
+/// too narrow or too wide for sizes in between.
 pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.003, scale: 0.003 },
     Spread { shape: 0.003, scale: 0.01 },
@@ -60,7 +61,7 @@ pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.3, scale: 0.3 },
 ];
 
-/// Largest deviation of a small difference of all bodies.
+/// Largest standard deviation that is treated as a small difference of all bodies.
 const SMALL: f64 = 0.03;
 
 /// The ten nominal values of a body.

@@ -1,4 +1,4 @@
-//! The written model under an explanation by few bodies, and the error of its torque after an edit.
+//! The exported model if few bodies differ from the description, and its torque error after single bodies are edited.
 
 use super::average::BodyUncertainty;
 use super::differences::Differences;
@@ -11,14 +11,14 @@ use dynident_estimation::{HALF_WIDTH_95, LinearProblem};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Probability of a change below which a body keeps the values of the description. Twice the prior probability, which a
-/// body without effect on the torque keeps.
+/// Probability of a change below which a body keeps the values of the description. It is twice the prior probability,
+/// which is also the result for a body without effect on the torque.
 const MAX_UNCHANGED_PROBABILITY: f64 = 0.1;
 
-/// Smallest mass of a changed body relative to its description.
+/// Minimum mass of a changed body, relative to its mass in the description.
 const MIN_MASS_RATIO: f64 = 0.1;
 
-/// Expected error of the torque after a body gets the values of the description again.
+/// Expected torque error if a body gets the values of the description again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RestoredBody {
@@ -26,15 +26,15 @@ pub struct RestoredBody {
     pub name: String,
     /// Probability that the body differs from the description.
     pub probability: f64,
-    /// Expected torque error of the other bodies after this body gets the values of the description, relative to the
-    /// torque of that robot on the training motion, percent (root mean square); null without torque.
+    /// Expected torque error if this body gets the values of the description and the others keep their exported values,
+    /// percent of the torque of that robot on the training motion (root mean square); null without torque.
     pub error_percent: Option<f64>,
     /// Upper end of the 95 % interval of this error, percent.
     pub error_95_percent: Option<f64>,
 }
 
-/// Prior knowledge for the written model under `explanation`: the bodies that changed get the mean of the change, the
-/// others keep the description with the spread of the explanation.
+/// Prior knowledge for the exported model according to `explanation`. The changed bodies get the mean of the change;
+/// the others keep the values of the description, with the uncertainty of the explanation.
 pub(crate) fn knowledge_of(
     differences: &Differences,
     explanation: &Explanation,
@@ -55,7 +55,8 @@ pub(crate) fn knowledge_of(
     found
 }
 
-/// A consistent body with the mass and first moment of `nominal + change`, and its inertia if that is consistent.
+/// A physically consistent body with the mass and first moment of `nominal + change`; it also has the inertia of this
+/// sum if that is consistent.
 fn changed_body(nominal: &[f64], change: &DVector<f64>) -> [f64; 10] {
     let sum: [f64; 10] = core::array::from_fn(|k| nominal[k] + change[k]);
     if consistent_body(&sum).0 {
@@ -77,9 +78,10 @@ fn changed_body(nominal: &[f64], change: &DVector<f64>) -> [f64; 10] {
     })
 }
 
-/// Expected torque errors after each body is restored: with the other bodies' error `e`, the mean of `‖W E e‖²` over
-/// all explanations. The 95 % quantile of a quadratic form of normal variables is at most 1.96² times its mean
-/// (Szekely and Bakirov, Probability Theory and Related Fields 126 (2003) 184).
+/// Expected torque errors after each body is restored: the mean of `‖W E e‖²` over all explanations, where e is the
+/// error of the other bodies, E the effect on the base parameters and W the regressor. The 95 % quantile of a quadratic
+/// form of normal variables is at most 1.96² times its mean (Szekely and Bakirov, Probability Theory and Related Fields
+/// 126 (2003) 184).
 pub(crate) fn restored_errors(
     differences: &Differences,
     uncertainty: &BodyUncertainty,

@@ -1,4 +1,4 @@
-//! Selection of friction from the recordings: first the terms, then their constants.
+//! Selection of friction from the recordings: first the terms, then their nonlinear constants.
 
 use super::constants::{
     best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, take, with_constants,
@@ -22,13 +22,14 @@ use nalgebra::DMatrix;
 /// A model with selected friction.
 #[derive(Clone, Debug)]
 pub struct ChosenFriction {
-    /// Model, including the load if friction depends on it.
+    /// Robot model with the selected friction, including the bodies whose torque is the load if friction depends on it.
     pub model: RegressorModel,
-    /// Selection of each joint; empty if nothing was selected.
+    /// Selected friction of each joint; empty if nothing was selected.
     pub joints: Vec<JointFriction>,
-    /// Rows and fit with the stated terms, the start of the selection; `None` if nothing was selected.
+    /// Rows and fit with the friction terms that the study states, from which the selection starts; `None` if nothing
+    /// was selected.
     pub stated: Option<(Training, Estimate)>,
-    /// Effect of the constants' error on all parameters; `None` if nothing was selected.
+    /// Effect of the error of the friction constants on all parameters; `None` if nothing was selected.
     pub(crate) constants_error: Option<ConstantsError>,
 }
 
@@ -37,15 +38,16 @@ impl ChosenFriction {
         Self { model, joints: Vec::new(), stated: None, constants_error: None }
     }
 
-    /// The covariance that the uncertainty of the friction constants adds to an estimate of the columns `symbols`.
+    /// Covariance that the uncertainty of the friction constants adds to an estimate of the parameters `symbols`.
     pub fn error_of_constants(&self, symbols: &[String], estimate: &Estimate) -> Option<DMatrix<f64>> {
         self.constants_error.as_ref().map(|error| error.covariance_of(symbols, estimate))
     }
 }
 
 /// Selects the friction of the joints in `settings.friction` by cross-validation within the recordings `training`.
-/// First it selects terms from one set of factors that contains all terms on a grid of constants. Then further passes
-/// refine the constants together with all parameters. Filters are those of `logs`.
+/// First, it selects terms with one set of triangular factors that contains all candidate terms, with their nonlinear
+/// constants on a grid. Then further passes over the recordings refine the constants together with all parameters. The
+/// filters of `logs` are used.
 ///
 /// # Errors
 /// Recordings cannot be read, or rows do not determine an estimate.
@@ -63,7 +65,7 @@ pub fn choose_friction(
     friction_by_terms(&passes, logs, robot, None)
 }
 
-/// Friction as stated, with the error of constants that other recordings selected.
+/// Friction as the study states it, with the uncertainty of constants that were selected from other recordings.
 pub(crate) fn stated_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -72,14 +74,15 @@ pub(crate) fn stated_friction(
     if before.is_empty() {
         return Ok(ChosenFriction::as_stated(stated));
     }
-    // Without the load, load-dependent friction would look like noise.
+    // If the load were missing, load-dependent friction would appear as noise.
     let stated = if stated.needs_load() { passes.fit(stated)?.model } else { stated };
     let constants_error = error_of_constants(passes, before, &stated)?;
     Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) })
 }
 
-/// Selects friction: terms from the rows of `passes`, constants from those of `of_constants`. Terms on the grid may be
-/// known [before](friction_by_grid). If `passes` has too few rows, terms are also selected from `of_constants`.
+/// Selects friction terms from the rows of `passes`, and their constants from the rows of `of_constants`. The terms may
+/// already be known from [`friction_by_grid`]. If `passes` has too few rows, terms are also selected from
+/// `of_constants`.
 pub(crate) fn friction_of_logs(
     passes: &TrainingPasses<'_>,
     of_constants: &Logs<'_>,
@@ -110,7 +113,7 @@ fn friction_by_terms(
         searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
     let of_constants = TrainingPasses { logs: of_constants, ..*passes };
     let (mut model, constants_error) = best_constants(&of_constants, robot, &mut joints, &near_rest, model, &gains)?;
-    // The next fit estimates the gains with the selected friction.
+    // The next fit estimates the torque gains with the selected friction.
     model.torque_gains.clear();
     Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
 }
@@ -118,7 +121,7 @@ fn friction_by_terms(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GridTerms {
     All,
-    /// Only terms without memory. Maxwell-slip friction itself acts late and would absorb a lag.
+    /// Only terms without hysteresis. Maxwell-slip friction responds with a delay and would absorb a lag.
     WithoutMemory,
 }
 
@@ -128,8 +131,8 @@ impl GridTerms {
     }
 }
 
-/// Selects terms and constants on a grid, at the cut-off of `logs`. This is sufficient to estimate a lag, in a third of
-/// the time. `None` if no joint is open.
+/// Selects friction terms with constants on a grid, at the cut-off of `logs`. This is sufficient to estimate a lag and
+/// takes a third of the time. `None` if the friction of all joints is stated.
 pub(crate) fn friction_by_grid(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -160,7 +163,7 @@ pub(crate) struct GridFriction {
 }
 
 impl GridFriction {
-    /// Unchanged, for the estimation of a lag.
+    /// The grid selection as final friction, with the constants of the grid, for the estimation of a lag.
     pub(crate) fn as_chosen(&self) -> ChosenFriction {
         let Self { mut model, joints, stated, .. } = self.clone();
         model.torque_gains.clear();
@@ -177,8 +180,8 @@ fn friction_of_grid(
     let TrainingPasses { logs, settings, .. } = passes;
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
 
-    // Fit of the stated terms: load, noise of every joint, excited columns, and torque in newton metres if gains are
-    // unknown.
+    // Fit with the stated terms. It gives the load, the noise of every joint and the excited columns, and the torque in
+    // newton metres if gains are unknown.
     let first = passes.with_gains(passes.rows_once(RegressorModel::from(robot.clone()))?)?;
     let plain = match &first.gains {
         Some((with_gains, _)) => with_gains.clone(),
@@ -186,7 +189,7 @@ fn friction_of_grid(
     };
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
-    // All candidates are columns of one set of factors; each candidate model is a selection of them.
+    // All candidate terms are columns of one set of factors; each candidate model is a selection of these columns.
     let limits_of = |(_, search): &(usize, &FrictionSearch)| SearchLimits {
         max_inflation: search.most_inflation.unwrap_or(f64::INFINITY),
         thresholds: &settings.thresholds.friction,
@@ -198,7 +201,8 @@ fn friction_of_grid(
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, &first.model, &plain.values, &gains)?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &limits, &plain, equal_weights)?)
     };
-    // First the width of the step, then all terms. With payloads the load of the bare arm would be wrong.
+    // First the velocity scale of the smoothed sign is selected, then all terms. Logs with payloads are excluded,
+    // because their load differs from that of the bare arm.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);
     let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, scale(*joint)))).collect();
     let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(smooth_step_width).collect();
@@ -214,14 +218,15 @@ fn friction_of_grid(
     Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 
-/// Compares friction that was selected at another cut-off, with constants refitted to these rows, with `other`, which
-/// was selected from these rows. Each joint takes `other` if it has the lower information criterion.
+/// Compares two selections of friction on the same rows: `chosen`, which was selected at another cut-off and whose
+/// constants are refitted to these rows, and `other`, which was selected from these rows. For each joint, the selection
+/// with the lower information criterion is used.
 ///
-/// A selection at a higher cut-off can show more than the first one. At a lower cut-off (`shows_less`) residuals are
-/// correlated, and the rows contain far less information than independent rows. If the residual is unmodelled friction,
-/// on the other hand, the error bars underestimate the effective number of rows. So `other` must then be better in both
-/// cases: with all rows and with the effective number of rows. A term that it adds needs stronger evidence than in a
-/// first selection.
+/// Rows at a higher cut-off can show more details of friction than those of the first selection. At a lower cut-off
+/// (`shows_less`), residuals are correlated, so the rows contain far less information than as many independent rows. On
+/// the other hand, if the residual is unmodelled friction, the effective number of rows that follows from the error
+/// bars is too small. At a lower cut-off, `other` must therefore be better with both numbers: all rows, and the
+/// effective number of rows. A term that `other` adds needs stronger evidence than in a first selection.
 pub(crate) fn better_friction(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -246,15 +251,15 @@ pub(crate) fn better_friction(
         return Ok(ChosenFriction { model, joints, stated, constants_error });
     }
 
-    // A mixture; each joint keeps the constants found with its own selection.
+    // Some joints have one selection, some the other; each joint keeps the constants of its own selection.
     take(&mut joints, other.joints, &taken);
     let model = passes.with_friction(robot, &joints, &model)?;
     let constants_error = error_of_constants(passes, &joints, &model)?;
     Ok(ChosenFriction { model, joints, stated, constants_error })
 }
 
-/// Refits the constants of friction that was selected from an excerpt to all rows: one Gauss-Newton step from the
-/// constants of the excerpt, which are close.
+/// Adjusts the constants of friction that was selected from an excerpt to all rows. One Gauss-Newton step is
+/// sufficient, because the constants from the excerpt are close.
 pub(crate) fn constants_of_all_rows(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,

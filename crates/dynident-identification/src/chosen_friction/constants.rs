@@ -1,5 +1,5 @@
-//! Constants of selected friction, estimated together with all parameters: passes over the recordings from the grid
-//! values, and from a second start if the first one is known to end in a local minimum.
+//! Nonlinear constants of selected friction, estimated together with all parameters. Passes over the recordings start
+//! from the values on the grid, and from a second start if the first is known to end in a local minimum.
 
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
@@ -14,15 +14,15 @@ use dynident_estimation::{LinearProblem, WeightedValues};
 use dynident_model::terms::TorqueTerm;
 use dynident_rows::RegressorModel;
 
-/// Maximum number of passes for the constants, plus one if the last step was too long.
+/// Maximum number of passes over the recordings for the constants, plus one if the last step was too long.
 const MAX_PASSES: usize = 8;
-/// Passes after which insignificant terms are dropped although constants have not converged.
+/// Number of passes after which insignificant terms are dropped, even if the constants have not converged.
 const DROP_PASSES: usize = 3;
 /// Maximum number of halvings of a step that makes the fit worse.
 const MAX_HALVINGS: usize = 3;
-/// Increase of the deviance that is tolerated for a step; far below its statistical variation.
+/// Increase of the deviance that a step may cause; it is far below the statistical variation of the deviance.
 const MAX_DEVIANCE_INCREASE: f64 = 0.1;
-/// Minimum number of passes for load-dependent friction, which uses the load of the previous fit.
+/// Minimum number of passes for load-dependent friction, because each pass uses the load of the previous fit.
 const MIN_LOAD_PASSES: usize = 3;
 
 struct LastPass {
@@ -32,18 +32,19 @@ struct LastPass {
     halvings: usize,
 }
 
-/// One pass for the constants of selected friction: rows with neighbouring columns, and the fit.
+/// One pass for the constants of selected friction: rows with additional columns for changed constants, and the fit.
 struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
     merged: Vec<LogFactors>,
-    /// The same rows without neighbouring columns.
+    /// The same rows without the additional columns for changed constants.
     problem: LinearProblem,
     fit: WeightedValues,
 }
 
 impl ConstantsPass {
-    /// The Gauss-Newton step of the friction constants, and its covariance, from which their error bars are computed.
+    /// Computes the Gauss-Newton step of the friction constants and its covariance, which gives the error bars of the
+    /// constants.
     fn step(
         &self,
         passes: &TrainingPasses<'_>,
@@ -54,7 +55,7 @@ impl ConstantsPass {
         self.step_by(passes, constants, model, gains, &self.factors, &passes.settings.estimation)
     }
 
-    /// The same step with error bars that assume independent rows, without time segments.
+    /// Computes the Gauss-Newton step with error bars that assume independent rows, without time segments.
     fn step_without_bars(
         &self,
         passes: &TrainingPasses<'_>,
@@ -93,14 +94,14 @@ fn take_intervals(
 }
 
 pub(crate) struct FrictionEvidence {
-    /// Number of rows with the information of one independent row ([`FrictionConstants::design_effect`]).
+    /// Number of rows that contain as much information as one independent row ([`FrictionConstants::design_effect`]).
     pub(crate) design_effect: f64,
-    /// Whether it has possibly insignificant terms that the first selection did not have.
+    /// Whether the friction has possibly insignificant terms that the first selection did not have.
     pub(crate) is_doubtful: bool,
 }
 
-/// Evidence of the rows of `passes` for the friction of every joint, with refitted constants. The first selection from
-/// the same motion had the friction `before`. Without constants all rows are treated as independent.
+/// Evidence of the rows of `passes` for the friction of every joint, with refitted constants. `before` is the first
+/// selection of friction from the same motion. For joints without constants, all rows are treated as independent.
 pub(crate) fn friction_evidence(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -128,9 +129,9 @@ pub(crate) fn friction_evidence(
     Ok(joints.iter().zip(before).map(of_joint).collect())
 }
 
-/// Finds the best constants from the grid values and, for joints with rows near rest, from a [second
-/// start](second_start). Each joint takes the friction with the lower Bayesian information criterion. `gains` are
-/// joints with unknown gains.
+/// Finds the best constants from the values on the grid and, for joints with rows near rest, from a [second
+/// start](second_start). For each joint, the friction with the lower Bayesian information criterion is used. `gains`
+/// are joints with unknown torque gains.
 pub(crate) fn best_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -156,7 +157,7 @@ pub(crate) fn best_constants(
         return Ok(first);
     }
 
-    // From the second start; then the better of both.
+    // Fit from the second start; the better result of both is used.
     let start = passes.with_friction(robot, &others, &first.0)?;
     let second = with_constants(passes, robot, &mut others, start, gains)?;
     let as_counted = vec![1.0; joints.len()];
@@ -173,9 +174,9 @@ pub(crate) fn best_constants(
     with_constants(passes, robot, joints, start, gains)
 }
 
-/// Whether the second of two frictions has the lower Bayesian information criterion (Schwarz, Annals of Statistics 6
-/// (1978) 461) at each joint, both with all rows and with the number of rows reduced by `design_effects`. Only joints
-/// in `is_other` can differ.
+/// For each joint, whether the friction `others` has a lower Bayesian information criterion (Schwarz, Annals of
+/// Statistics 6 (1978) 461) than the friction `joints`. It must be lower with all rows and with the number of rows
+/// divided by `design_effects`. Only joints in `is_other` can differ.
 pub(crate) fn better_of_joints(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -200,14 +201,15 @@ pub(crate) fn better_of_joints(
     Ok((0..joints.len()).map(is_better).collect())
 }
 
-/// Copies the friction of `others` to the joints marked in `taken`.
+/// Copies the friction in `others` to the joints that are marked in `taken`.
 pub(crate) fn take(joints: &mut [JointFriction], others: Vec<JointFriction>, taken: &[bool]) {
     for ((one, other), _) in joints.iter_mut().zip(others).zip(taken).filter(|(_, taken)| **taken) {
         *one = other;
     }
 }
 
-/// Error of the constants of friction that other rows selected, from these rows; `None` without constants.
+/// Uncertainty of the constants of friction that was selected from other rows, computed from these rows; `None` without
+/// constants.
 pub(crate) fn error_of_constants(
     passes: &TrainingPasses<'_>,
     joints: &[JointFriction],
@@ -221,7 +223,8 @@ pub(crate) fn error_of_constants(
     Ok(Some(step.error().clone()))
 }
 
-/// One step of the constants for friction that was selected from other rows; `None` if nothing can change.
+/// Makes one Gauss-Newton step of the constants of friction that was selected from other rows; `None` if no constant
+/// can change.
 pub(crate) fn one_step(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -240,7 +243,8 @@ pub(crate) fn one_step(
     Ok(Some((with_chosen(robot, joints, &terms, model, &measured.fit.values)?, error)))
 }
 
-/// Fit of every joint's rows by a model; the parameters of a joint are the terms and constants of its friction.
+/// Quality of the fit to each joint's rows. The number of parameters of a joint is the number of terms and constants of
+/// its friction.
 fn friction_scores(
     passes: &TrainingPasses<'_>,
     model: &RegressorModel,
@@ -257,8 +261,8 @@ fn friction_scores(
     Ok(scores)
 }
 
-/// Refines the constants of the selected terms and drops insignificant terms; returns the model and the error of the
-/// constants. `gains` are joints with unknown gains.
+/// Refines the constants of the selected terms and drops insignificant terms; returns the model and the uncertainty of
+/// the constants. `gains` are joints with unknown torque gains.
 pub(crate) fn with_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
@@ -278,8 +282,8 @@ pub(crate) fn with_constants(
         let measured = passes.constants_pass(&constants, &model)?;
         let fit = &measured.fit;
 
-        // A step that made the fit worse was too long. If no shorter step helps, the constants are final, and one more
-        // pass shows which terms have no supporting rows.
+        // A step that increased the misfit was too long and is halved. If no shorter step helps, the constants are
+        // final, and one more pass shows which terms no rows support.
         let misfit = misfit(&measured.problem, &fit.joint_sigma, equal_weights);
         if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + MAX_DEVIANCE_INCREASE) {
             before.halvings += 1;
@@ -307,8 +311,8 @@ pub(crate) fn with_constants(
         error = Some(step.error().clone());
         let has_converged = are_found || step.has_converged() && (pass >= MIN_LOAD_PASSES || !model.needs_load());
 
-        // Drop the weakest insignificant term of every joint and repeat. If the passes made no progress, terms may be
-        // significant only together, so drop only those without supporting rows.
+        // Drops the weakest insignificant term of every joint and repeats. If the passes made no progress, terms may be
+        // significant only together, so only terms that no rows support are dropped.
         let weak = if are_found { Weak::Unsupported } else { Weak::Insignificant };
         let fewer = constants.without_weakest(weak, &model, &measured.problem.column_norms(), &step, thresholds);
         if pass >= MAX_PASSES {
@@ -333,7 +337,7 @@ pub(crate) fn with_constants(
     Ok((model, error))
 }
 
-/// The robot with these terms, and the load of a fit of the previous model.
+/// The robot with these terms, and the load from a fit of the previous model.
 fn with_chosen(
     robot: &ParametricModel,
     joints: &mut [JointFriction],
@@ -349,7 +353,7 @@ fn with_chosen(
 }
 
 impl TrainingPasses<'_> {
-    /// The robot with this friction, and the load of a fit with the friction of `before`.
+    /// The robot with this friction, and the load from a fit with the friction of `before`.
     pub(super) fn with_friction(
         &self,
         robot: &ParametricModel,
@@ -366,7 +370,7 @@ impl TrainingPasses<'_> {
         Ok((rows, fit))
     }
 
-    /// Rows of a model with the neighbouring columns of its constants.
+    /// Rows of a model with additional columns for changed friction constants.
     fn constants_pass(
         &self,
         constants: &FrictionConstants,
@@ -382,7 +386,8 @@ impl TrainingPasses<'_> {
     }
 }
 
-/// Deviance of a fit; with equal weights of the joints that of all rows together, `N ln(Σ N_j σ_j²)`.
+/// Deviance of a fit (minus twice the log-likelihood). If all joints have equal weights, the deviance of all rows
+/// together, `N ln(Σ N_j σ_j²)`, with N_j rows and residual variance σ_j² of joint j.
 fn misfit(problem: &LinearProblem, joint_sigma: &[f64], equal_weights: bool) -> f64 {
     if !equal_weights {
         return deviance(problem, joint_sigma);

@@ -1,4 +1,4 @@
-//! Selecting friction: terms on a grid of constants, then the constants.
+//! Selection of friction: terms with nonlinear constants on a grid, then the constants.
 
 mod choice;
 mod constants;

@@ -1,4 +1,4 @@
-//! Common parts of the passes for friction: models with additional columns, and their rows.
+//! Common parts of the passes that select friction: models with additional columns, and their rows.
 
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
@@ -15,7 +15,7 @@ pub(crate) fn without_bars(settings: &IdentificationSettings) -> EstimationSetti
     EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
 }
 
-/// Adds those terms as columns that the model does not have.
+/// Adds the terms that the model does not have as columns.
 pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = TorqueTerm>) -> RegressorModel {
     let known = model.layout().columns();
     let mut further: Vec<TorqueTerm> = Vec::new();
@@ -27,7 +27,7 @@ pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = Tor
     model.with_further_columns(further)
 }
 
-/// The robot with the selected friction, and the gains and the load of a fit of the previous model.
+/// The robot with the selected friction, and with the torque gains and the load from a fit of the previous model.
 pub(crate) fn with_friction_of(
     robot: &ParametricModel,
     joints: &[JointFriction],
@@ -40,8 +40,8 @@ pub(crate) fn with_friction_of(
 }
 
 impl TrainingPasses<'_> {
-    /// Rows of `wide`, with the gains of the joints `free` as unknowns about the values `fitted`. These belong to the
-    /// columns of `model` and then to the additional columns of the logs.
+    /// Rows of the model `wide` in which the torque gains of the joints `free` are unknowns that may deviate from their
+    /// last values. `fitted` are values for the columns of `model`, followed by the additional columns of single logs.
     pub(crate) fn free_problem(
         &self,
         wide: &RegressorModel,

@@ -34,10 +34,10 @@ pub enum ConsistencyError {
         /// The robot's terms.
         known: Vec<String>,
     },
-    /// Contradictory limits, an inconsistent prior body, values that are not finite.
+    /// Limits of a body that contradict each other, an inconsistent prior body, or values that are not finite.
     #[error("{0}")]
     Physical(#[from] PhysicalError),
-    /// Factors of another robot.
+    /// The triangular factors belong to another robot.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
 }

@@ -1,4 +1,4 @@
-//! Intervals of the parameters of bodies and terms over all physically consistent robots.
+//! Intervals of inertial, friction and drive parameters over all physically consistent robots.
 
 use super::error::ConsistencyError;
 use super::problem::consistency_problem;
@@ -10,29 +10,29 @@ use dynident_rows::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The 95 % interval of one parameter of a body or term, over all physically consistent robots that the data do not
-/// reject.
+/// The 95 % interval of one inertial, friction or drive parameter, over all physically consistent robots that the data
+/// do not reject.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterInterval {
     /// Symbol of the parameter: `m3`, `mx3`, `Ixx3` (about the body frame's origin), `fv3`.
     pub symbol: String,
-    /// Name of the body or joint; `None` for a term of several joints.
+    /// Name of the body or joint; `None` for a term that belongs to several joints.
     pub of: Option<String>,
-    /// Its unit at a revolute joint.
+    /// Unit of the parameter at a revolute joint.
     pub unit: String,
     /// Value in the best consistent fit.
     pub value: f64,
-    /// Lower end; `None` if unbounded.
+    /// Lower end; `None` if the parameter has no lower bound.
     pub lower: Option<f64>,
-    /// Upper end; `None` if unbounded.
+    /// Upper end; `None` if the parameter has no upper bound.
     pub upper: Option<f64>,
-    /// The bound at the lower and the upper end: data, a constraint, or nothing.
+    /// What limits the lower end and the upper end: the data, a constraint, or nothing.
     pub held_by: [IntervalEnd; 2],
 }
 
-/// The 95 % intervals of all parameters, over all consistent sets that the data do not reject; `plain` if the estimate
-/// is the least-squares solution of these rows.
+/// The 95 % intervals of all parameters, over all physically consistent sets that the data do not reject. `plain`
+/// states whether the estimate is the least-squares solution of these rows.
 ///
 /// # Errors
 /// Values that are not finite, contradictory limits of bodies.
@@ -50,7 +50,7 @@ pub fn consistent_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    // Each base parameter has its own degrees of freedom. For sums of base parameters the median is used.
+    // Each base parameter has its own degrees of freedom. For sums of base parameters, their median is used.
     let mut degrees_of_freedom: Vec<f64> = estimate
         .std_degrees_of_freedom
         .iter()

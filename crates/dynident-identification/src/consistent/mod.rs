@@ -1,8 +1,9 @@
-//! Physically consistent parameters: the best fit with positive masses, positive definite pseudo-inertias and
+//! Physically consistent parameters: the best fit that has positive masses, positive definite pseudo-inertias and
 //! dissipative friction.
 //!
-//! [`consistent_parameters`] computes all parameters from the factors of an estimate, [`nearest_consistent_parameters`]
-//! from an estimate by another method. [`ConsistencySettings`] contains prior knowledge of the bodies.
+//! [`consistent_parameters`] computes all parameters from the triangular factors of the rows;
+//! [`nearest_consistent_parameters`] computes them for an estimate by another method than least squares.
+//! [`ConsistencySettings`] contains prior knowledge of the bodies.
 
 mod error;
 mod intervals;

@@ -7,15 +7,18 @@ use dynident_estimation::LinearProblem;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, Matrix4};
 
-/// Standard deviation of a term, relative to the value for which the term alone explains the torque of its joint.
+/// Standard deviation of a friction or drive parameter, relative to the value with which the term alone would explain
+/// the torque of its joint.
 const TERM_STD_RATIO: f64 = 0.5;
 
-/// Covariance of the nominal base parameters, (base, base), for values that the data do not determine.
+/// Covariance matrix of the base parameters of the robot description, for values that the data do not determine.
 ///
-/// A body's pseudo-inertia J is `J_0 + ρ J_0^½ X J_0^½` with X symmetric and Gaussian of unit variance (half of it off
-/// the diagonal) and ρ = 0.3: standard deviations are 30 % of the mass, of the body's extent for the centre of mass,
-/// and of its inertia, in any frame and units. The standard deviation of a torque term combines 30 % of its value and
-/// half of the value for which it alone explains the torque of its joint, since friction is hardly known in advance.
+/// The true pseudo-inertia J of a body is assumed to be `J_0 + ρ J_0^½ X J_0^½` with the described pseudo-inertia J_0
+/// and ρ = 0.3. X is a symmetric matrix of Gaussian variables with variance 1 on the diagonal and 1/2 elsewhere. In any
+/// frame and units, this gives standard deviations of 30 % of the mass, 30 % of the inertia, and 30 % of the body's
+/// extent for the centre of mass. The standard deviation of a friction or drive parameter combines 30 % of its value
+/// and half of the value with which it alone would explain the torque of its joint, because friction is hardly known in
+/// advance.
 pub fn nominal_covariance(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -30,11 +33,11 @@ pub fn nominal_covariance(
     &spread * spread.transpose()
 }
 
-/// The changes of the base parameters for independent errors of one standard deviation, ten for each body that is not
-/// known: those of [`nominal_covariance`] without terms.
+/// Changes of the base parameters for independent errors of one standard deviation, ten for each body whose parameters
+/// are not known. These are the errors of [`nominal_covariance`], without friction and drive parameters.
 ///
-/// `thicker` is an added thickness of each body relative to its extent, in all directions, since rods and plates of a
-/// description also have errors across their thin directions.
+/// `thicker` is a thickness that is added to each body in all directions, relative to its extent, because rods and
+/// plates of a description also have errors in their thin directions.
 pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySettings, thicker: f64) -> Vec<Vec<f64>> {
     let references = reference_bodies(robot, settings);
     let mut directions: Vec<Vec<f64>> = Vec::new();
@@ -52,11 +55,11 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
     directions
 }
 
-/// Change of all parameters of the bodies for independent errors of one relative standard deviation of 1, eleven for
-/// each body: the directions of [`nominal_covariance`] divided by its 30 %, and the distance of the centre of mass from
-/// the joint. Links are nearly symmetric about their length; the position of a motor along it may be wrong by more than
-/// a part of the motor's size. `None` if the nominal values of a body are not
-/// consistent.
+/// Changes of all inertial parameters for independent errors with a relative standard deviation of 1, eleven for each
+/// body. Ten are the directions of [`nominal_covariance`] divided by its 30 %. The eleventh is the distance of the
+/// centre of mass from the joint: links are nearly symmetric about their length, but the position of a motor along the
+/// link may be wrong by a large part of its size. `None` if the nominal values of a body
+/// are inconsistent.
 pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySettings) -> Option<DMatrix<f64>> {
     let bodies = robot.model().bodies();
     if !robot.nominal()[..10 * bodies.len()].chunks_exact(10).all(|body| consistent_body(body).0) {
@@ -74,21 +77,22 @@ pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySetting
     Some(spread)
 }
 
-/// The base parameters for a unit value of one parameter.
+/// The base parameters for a unit value of one parameter and zero for all others.
 fn of_column(robot: &ParametricModel, column: usize) -> Vec<f64> {
     let mut values = vec![0.0; robot.model().inertial_count() + robot.terms().len()];
     values[column] = 1.0;
     robot.base().values(&values)
 }
 
-/// Standard deviation of the nominal value of each torque term.
+/// Standard deviation of the nominal value of each friction or drive parameter.
 pub(super) fn term_spreads(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
     let values = &robot.nominal()[robot.model().inertial_count()..];
     let sizes = term_sizes(robot, problem, 1.0);
     values.iter().zip(sizes).map(|(value, size)| (MASS_STD_RATIO * value).hypot(TERM_STD_RATIO * size)).collect()
 }
 
-/// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm, of a body with added thickness.
+/// Ten inertial parameters of `ρ J^½ S J^½` for each of ten symmetric matrices S of unit norm, where J is the
+/// pseudo-inertia of a body with added thickness.
 fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
     let mut pseudo = InertialParameters(*body).pseudo_inertia();
     let of_point = InertialParameters(*body).com_m().map_or(0.0, |com| body[0] * com.dot(com));
@@ -109,8 +113,9 @@ fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
         .collect()
 }
 
-/// Derivative of the ten parameters by a factor on the distance of the centre of mass from the origin, with constant
-/// mass and inertia about it. The parameters are quadratic in this factor, so a central difference is exact.
+/// Derivative of the ten parameters by a factor on the distance of the centre of mass from the origin, for constant
+/// mass and constant inertia about the centre of mass. The parameters are quadratic in this factor, so a central
+/// difference is exact.
 fn along_link(body: &[f64; 10]) -> [f64; 10] {
     let own = InertialParameters(*body);
     let (Some(centre), Some(inertia)) = (own.com_m(), own.inertia_at_com()) else { return [0.0; 10] };

@@ -1,4 +1,4 @@
-//! Consistent parameters for any estimate.
+//! Physically consistent parameters for any estimate.
 
 use super::error::ConsistencyError;
 use super::problem::{consistent_parameters, nearest_consistent_parameters};
@@ -7,8 +7,9 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem};
 
-/// The best consistent fit to the factors of the estimate; if the estimate is not their least-squares solution (`plain`
-/// is false), the consistent parameters that are nearest to it in the metric of the factors.
+/// The best physically consistent fit to the rows of the estimate. If the estimate is not the least-squares solution of
+/// these rows (`plain` is false), the physically consistent parameters with the smallest torque difference from the
+/// estimate on these rows.
 ///
 /// # Errors
 /// As [`consistent_parameters`].

@@ -1,4 +1,4 @@
-//! Error bars of all parameters of the consistent set, from data and robot description.
+//! Error bars of all parameters of the physically consistent set, from data and robot description.
 
 use super::error::ConsistencyError;
 use super::nominal_spread::term_spreads;
@@ -9,9 +9,9 @@ use dynident_estimation::consistent::{MassPrior, expected_error};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::Body;
 
-/// Standard deviation of every parameter of the consistent set, ten for each body and one for each term: the
-/// [`expected_error`] with the covariance of the estimate and that of the description
-/// ([`nominal_covariance`](super::nominal_covariance)). Identifiable values get the error bar of the data, an
+/// Standard deviation of every parameter of the physically consistent set, ten for each body and one for each friction
+/// or drive term. It is the [`expected_error`] for the covariance of the estimate and the covariance of the description
+/// ([`nominal_covariance`](super::nominal_covariance)). Identifiable values get the error bar of the data; an
 /// unidentifiable mass gets 30 %. `None` for bodies with a missing or inconsistent description: their prior is a rough
 /// body, so only their base parameters are meaningful.
 ///

@@ -1,4 +1,4 @@
-//! The physically consistent fit of all bodies and terms to the factors of an estimate.
+//! The physically consistent fit of all bodies and terms to the rows of an estimate.
 
 use super::error::ConsistencyError;
 use super::settings::{BodyKnowledge, ConsistencySettings, EllipsoidSettings};
@@ -10,22 +10,23 @@ use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Body, InertialParameters, Model};
 
-/// Smallest noise of a joint relative to the root mean square of its torque. In noise-free (simulated) torque the prior
-/// would otherwise be lost in double precision.
+/// Minimum noise of a joint relative to the root mean square of its torque. With noise-free simulated torque, the prior
+/// would otherwise be lost in rounding errors.
 const MIN_RELATIVE_NOISE: f64 = 1.0e-4;
 
-/// Standard deviation of a described mass, relative to the mass.
+/// Standard deviation of a mass in the robot description, relative to the mass.
 pub(super) const MASS_STD_RATIO: f64 = 0.3;
 
-/// Size of an unexcited term relative to its joint's torque: so small that the barrier of an interior-point method does
-/// not move it.
+/// Size of an unexcited friction or drive parameter relative to its joint's torque. It is so small that the barrier of
+/// the interior-point method does not move the parameter.
 const UNEXCITED_SIZE_RATIO: f64 = 1.0e-4;
 
-/// Share of a rough body that is added to each nominal body, since rods and plates have zero extent in some direction.
+/// Share of an approximate body that is added to each nominal body, because rods and plates have no extent in some
+/// direction.
 const ROUGH_BODY_SHARE: f64 = 1.0e-2;
 
-/// The best consistent fit to the factors of an estimate, with the noise of its joints (standard deviations, Nm). See
-/// [`physical_fit`].
+/// The best physically consistent fit to the rows of an estimate. `joint_sigma` is the standard deviation of the noise
+/// of each joint, Nm. See [`physical_fit`].
 ///
 /// # Errors
 /// Contradictory limits, an inconsistent prior body, unknown names, values that are not finite.
@@ -38,7 +39,7 @@ pub fn consistent_parameters(
     Ok(physical_fit(&described_problem(robot, problem, joint_sigma, settings)?, &settings.fit())?)
 }
 
-/// [`consistency_problem`] with the masses of the description as priors.
+/// Problem of [`consistency_problem`] with the masses of the robot description as priors.
 pub(super) fn described_problem(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -49,8 +50,8 @@ pub(super) fn described_problem(
     Ok(problem.with_mass_beliefs(mass_beliefs(robot, settings))?.with_body_priors(body_priors(robot, settings))?)
 }
 
-/// The consistent parameters whose base parameters are nearest to `theta` in the metric of the factors, for estimates
-/// that are not the least-squares solution of these factors.
+/// The physically consistent parameters whose torque on these rows differs least from the torque of the base parameters
+/// `theta`. For estimates that are not the least-squares solution of these rows.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -65,7 +66,7 @@ pub fn nearest_consistent_parameters(
     Ok(physical_fit(&around, &settings.fit())?)
 }
 
-/// The described masses, kg, with their standard deviations; `None` for bodies that the settings define.
+/// Masses in the robot description, kg, with their standard deviations; `None` for bodies that the settings define.
 fn mass_beliefs(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<[f64; 2]>> {
     let belief = |(index, body): (usize, &Body)| {
         let own = &robot.nominal()[10 * index..10 * index + 10];
@@ -76,7 +77,7 @@ fn mass_beliefs(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<
     robot.model().bodies().iter().enumerate().map(belief).collect()
 }
 
-/// The bodies whose settings state the standard deviation of their prior.
+/// Prior bodies for which the settings state a standard deviation.
 fn body_priors(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<BodyPrior>> {
     let prior = |(index, body): (usize, &Body)| {
         let own = settings.bodies.get(body.name())?;
@@ -87,8 +88,8 @@ fn body_priors(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<O
     robot.model().bodies().iter().enumerate().map(prior).collect()
 }
 
-/// Bodies whose nominal inertia is not physically consistent, unless the settings define them: names with the smallest
-/// eigenvalue of the pseudo-inertia, kg m². Their prior is a rough body.
+/// Bodies whose inertia in the robot description is not physically consistent, unless the settings define them: their
+/// names, and the smallest eigenvalue of the pseudo-inertia, kg m². The prior of such a body is an approximate body.
 pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<(String, f64)> {
     let bodies = robot.model().bodies().iter().enumerate();
     let stated = bodies.filter(|(_, body)| {
@@ -113,7 +114,8 @@ pub(crate) fn consistent_body(own: &[f64]) -> (bool, f64) {
     (stated.mass_kg() > 0.0 && least >= -rounding, least)
 }
 
-/// The problem that [`consistent_parameters`] solves, without the masses of the description.
+/// The optimisation problem that [`consistent_parameters`] solves, without the masses of the robot description as
+/// priors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -179,7 +181,8 @@ pub fn consistency_problem(
     }
 }
 
-/// The prior body of each: that of the settings, the nominal body with a small share of a rough body, or a rough body.
+/// Prior body of each body: the body in the settings, the nominal body with a small share of an approximate body, or
+/// only an approximate body.
 pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<[f64; 10]> {
     let (length, mean_mass) = (typical_length_m(robot.model()), mean_mass(robot));
     let reference = |(index, body): (usize, &Body)| {
@@ -196,16 +199,17 @@ pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySe
     robot.model().bodies().iter().enumerate().map(reference).collect()
 }
 
-/// The mean of the described masses, kg; 1 without any.
+/// Mean of the masses in the robot description, kg; 1 if it contains none.
 fn mean_mass(robot: &ParametricModel) -> f64 {
     let masses = (0..robot.model().body_count()).map(|body| robot.nominal()[10 * body]).filter(|&mass| mass > 0.0);
     let masses: Vec<f64> = masses.collect();
     if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 }
 }
 
-/// The value for which each torque term alone explains the torque of its joint, `‖τ_j‖ / ‖w‖` over all rows of the
-/// joint: a scale that suits any size of robot and any units. It is 1 for a term without a column in the data. For an
-/// unexcited term, whose column contains only noise, it is `silent` times the root mean square of the joint's torque.
+/// For each friction or drive term, the value with which the term alone would explain the torque of its joint:
+/// `‖τ_j‖ / ‖w‖` over all rows of joint j, with torque τ_j and column w of the term. This scale suits robots of any
+/// size and any units. It is 1 for a term without a column in the data. For an unexcited term, whose column contains
+/// only noise, it is `silent` times the root mean square of the joint's torque.
 pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silent: f64) -> Vec<f64> {
     let first = robot.model().inertial_count();
     let size = |(index, _): (usize, &TorqueTerm)| {
@@ -228,7 +232,7 @@ pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silen
 }
 
 /// Typical length of the robot's links, m: the mean distance between successive joints. If all axes meet in one point,
-/// the mean distance of the nominal centres of mass from their joints, or 1 without any.
+/// it is the mean distance of the nominal centres of mass from their joints, or 1 without nominal centres of mass.
 pub fn typical_length_m(model: &Model) -> f64 {
     let mean = |lengths: Vec<f64>| {
         let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;

@@ -1,4 +1,4 @@
-//! Settings of the physically consistent fit, and prior knowledge of bodies and terms.
+//! Settings of the physically consistent fit, and prior knowledge of bodies and friction.
 
 use super::error::ConsistencyError;
 use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
@@ -33,15 +33,15 @@ pub struct BodyKnowledge {
     pub com_box_m: Option<[[f64; 3]; 2]>,
     /// An ellipsoid that contains all of the mass.
     pub inside: Option<EllipsoidSettings>,
-    /// The prior body instead of the nominal one: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of
-    /// the link frame.
+    /// Prior body in place of the body in the robot description: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
+    /// about the origin of the link frame.
     #[serde(deserialize_with = "optional")]
     pub prior: Option<[f64; 10]>,
-    /// Standard deviation of the prior body relative to itself: of its mass, its inertia, and its extent for the centre
-    /// of mass. 0.02 keeps a body that was weighed and measured near its values. Without it, masses have 30 % and
-    /// shapes are hardly restricted.
+    /// Relative standard deviation of the prior body: of its mass, of its inertia, and of its centre of mass in units
+    /// of the extent of the body. With 0.02, a body that was weighed and measured remains near its values. Without this
+    /// setting, masses have a standard deviation of 30 %, and the mass distribution is hardly restricted.
     pub prior_std: Option<f64>,
-    /// The same ten parameters if they are known; they are not fitted.
+    /// Known inertial parameters of the body, in the same order as `prior`; they are not fitted.
     #[serde(deserialize_with = "optional")]
     pub known: Option<[f64; 10]>,
 }
@@ -61,15 +61,15 @@ pub struct BodyKnowledge {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ConsistencySettings {
-    /// Distance from the prior bodies; entropic by default.
+    /// Measure of the distance from the prior bodies; entropic by default.
     pub prior: PhysicalPrior,
-    /// Weight of that distance against half of the squared residual in standard deviations; 0.01 by default.
+    /// Weight of this distance, relative to half of the squared residual in units of its variance; 0.01 by default.
     pub prior_weight: f64,
-    /// Smallest whitened eigenvalue of every pseudo-inertia; 1e-4 by default.
+    /// Minimum eigenvalue of every pseudo-inertia, relative to the prior body (whitened); 1e-4 by default.
     pub margin: f64,
-    /// The solver; interior point by default.
+    /// Solver of the optimisation problem; interior point by default.
     pub route: PhysicalRoute,
-    /// Largest certificate of a solved fit; 5e-8 by default.
+    /// Largest value of the optimality certificate at which a fit is treated as solved; 5e-8 by default.
     pub tolerance: f64,
     /// Largest number of iterations; 2000 by default.
     pub max_iterations: usize,
@@ -78,8 +78,8 @@ pub struct ConsistencySettings {
     pub total_mass_kg: Option<[f64; 2]>,
     /// Prior knowledge of single bodies, by the name of their link.
     pub bodies: BTreeMap<String, BodyKnowledge>,
-    /// Minimum and maximum parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`). Friction and drive inertia are
-    /// never negative.
+    /// Minimum and maximum of a friction or drive parameter, by its symbol (`fv1 = [0.0, 5.0]`). Friction and drive
+    /// inertia are never negative.
     #[serde(deserialize_with = "intervals")]
     #[serde(rename = "laws")]
     pub terms: BTreeMap<String, [f64; 2]>,
@@ -104,13 +104,13 @@ impl Default for ConsistencySettings {
 }
 
 impl ConsistencySettings {
-    /// The solver's settings.
+    /// Settings for the solver.
     pub fn fit(&self) -> PhysicalSettings {
         let Self { prior, prior_weight, margin, route, tolerance, max_iterations, .. } = *self;
         PhysicalSettings { route, prior, prior_weight, margin, tolerance, max_iterations }
     }
 
-    /// Checks the settings of the solver. Limits are checked later, with the bodies.
+    /// Checks the settings of the solver. Limits of bodies are checked later, together with the robot.
     ///
     /// # Errors
     /// As [`PhysicalSettings::validate`].
@@ -141,7 +141,7 @@ impl ConsistencySettings {
     }
 }
 
-/// An array of exactly `N` values; serde alone ignores further values.
+/// Reads an array of exactly `N` values; serde alone ignores further values.
 fn array<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
     let found = values.len();
     values.try_into().map_err(|_| E::custom(format!("{found} values where {N} are expected")))

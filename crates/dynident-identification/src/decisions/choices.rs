@@ -1,4 +1,4 @@
-//! Current choices, with the evidence for each.
+//! Choices made so far (drive inertia, cut-off, lag, friction), with the evidence for each.
 
 use crate::bandwidth::CutoffByError;
 use crate::chosen_friction::{ChosenFriction, GridFriction};
@@ -10,13 +10,13 @@ use dynident_dynamics::ParametricModel;
 #[derive(Clone)]
 pub(crate) struct Drives {
     pub(crate) robot: ParametricModel,
-    /// The evidence; `None` if the terms state the drive inertia.
+    /// Evidence for the choice; `None` if the study states the drive inertia.
     pub(crate) choice: Option<DriveInertiaChoice>,
 }
 
 #[derive(Clone)]
 pub(super) struct CutoffChoice {
-    /// `None` if the cut-off is stated or the logs are too short.
+    /// Comparison of cut-offs; `None` if the study states the cut-off or the logs are too short.
     pub(super) by_error: Option<CutoffByError>,
 }
 
@@ -24,25 +24,25 @@ pub(super) struct CutoffChoice {
 #[allow(clippy::large_enum_variant, reason = "there is one value for each identification")]
 pub(super) enum FrictionChoice {
     Open,
-    /// With the constants of a grid: enough to estimate a lag.
+    /// Friction terms with constants on a grid, which is enough to estimate a lag.
     Grid(GridFriction),
-    /// Selected from an excerpt of the logs; its constants are still to be adjusted to all rows.
+    /// Friction that was selected from an excerpt of the logs; its constants must still be adjusted to all rows.
     OfExcerpt(ChosenFriction),
     Made(ChosenFriction),
 }
 
-/// Scope of a revision of the lag.
+/// Choices that must be made again if the lag is revised.
 #[allow(clippy::large_enum_variant, reason = "there is one value for each identification")]
 #[derive(Clone)]
 enum Origin {
-    /// All other choices, because they were made from rows with the lag.
+    /// All other choices, because they were made from rows with the previous lag.
     TheseLogs,
-    /// Only the friction constants, because the rest was selected from an excerpt.
+    /// Only the friction constants, because all other choices were made from an excerpt.
     Excerpt(ChosenFriction),
     Final,
 }
 
-/// Current choices. `None` and [`FrictionChoice::Open`] are open.
+/// Choices made so far. `None` and [`FrictionChoice::Open`] are choices that are still open.
 #[derive(Clone)]
 pub(crate) struct Choices {
     /// The compensated lag and the number of its revisions.
@@ -51,10 +51,10 @@ pub(crate) struct Choices {
     pub(super) cutoff: Option<CutoffChoice>,
     pub(super) grid: Option<GridFriction>,
     pub(super) friction: FrictionChoice,
-    /// The cut-off at which friction was selected, hertz; `None` if it was stated.
+    /// Cut-off at which friction was selected, hertz; `None` if the study states the cut-off.
     pub(super) friction_hz: Option<f64>,
     pub(super) cutoff_with_friction: Option<CutoffByError>,
-    /// Whether the lag before friction was decided.
+    /// Whether the lag that is compensated before friction is selected was decided.
     pub(super) has_lag_before_friction: bool,
     /// Whether friction was selected again at another cut-off.
     pub(super) has_cutoff_of_friction: bool,
@@ -62,7 +62,7 @@ pub(crate) struct Choices {
 }
 
 impl Choices {
-    /// All choices open, for lags of these candidates.
+    /// No choices yet; `candidates` are the lags that may be compensated.
     pub(super) fn open(candidates: LagCandidates) -> Self {
         Self {
             lag: LagRounds::of(candidates),
@@ -83,8 +83,8 @@ impl Choices {
         self.cutoff_with_friction.as_ref().or(before)
     }
 
-    /// The cut-off at which friction is selected, hertz: the highest with nearly the smallest parameter error, because
-    /// details of friction lie above the band of the motion.
+    /// Cut-off at which friction is selected, hertz: the highest one whose predicted parameter error is nearly the
+    /// smallest, because fast changes of friction at reversals are above the frequency band of the motion.
     pub(super) fn friction_cutoff_hz(&self) -> Option<f64> {
         self.cutoff().map(CutoffByError::highest_alike_hz)
     }
@@ -115,7 +115,7 @@ impl Choices {
         Self { lag, ..self }
     }
 
-    /// Keeps all other choices if the lag is revised.
+    /// Marks all other choices as final: a revision of the lag does not change them.
     pub(super) fn finish(&mut self) {
         self.origin = Origin::Final;
     }
@@ -131,8 +131,8 @@ impl Choices {
         }
     }
 
-    /// Choices of an excerpt as a start for all rows. The lag and the friction constants are revised, the rest is kept.
-    /// `candidates` are the lags allowed for all rows.
+    /// Takes the choices from an excerpt as a start for all rows. The lag and the friction constants are revised, the
+    /// rest is kept. `candidates` are the lags that may be compensated with all rows.
     #[must_use]
     pub(crate) fn of_excerpt(self, candidates: LagCandidates) -> Self {
         let cutoff = CutoffChoice { by_error: self.cutoff().cloned() };

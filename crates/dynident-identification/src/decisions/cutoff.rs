@@ -1,4 +1,4 @@
-//! Decision: the cut-off with the smallest predicted parameter error, with friction as stated.
+//! Decision about the cut-off with the smallest predicted parameter error, with friction as the study states it.
 
 use super::choices::CutoffChoice;
 use super::decision::{Decision, Next};

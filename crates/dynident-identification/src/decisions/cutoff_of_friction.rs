@@ -1,12 +1,13 @@
-//! Decision: friction at another cut-off.
+//! Decision whether friction is selected again at another cut-off.
 //!
-//! Friction has details above the band of the motion, so it is selected at the highest cut-off with nearly the smallest
-//! parameter error. That cut-off is predicted with the stated friction, whose wide step is not sensitive to velocity
-//! noise. With the selected friction the prediction can change: noise smears a narrow step, and other terms compensate
-//! for it. Friction is therefore selected again, once, in two cases: at a lower cut-off if the velocity noise exceeds a
-//! small ratio of the step width, or at a clearly higher cut-off. On the rows of that cut-off, each joint takes the
-//! friction with the lower Bayesian information criterion (Schwarz, Annals of Statistics 6 (1978) 461). A lower cut-off
-//! shows less, so terms that it adds need stronger evidence.
+//! Fast changes of friction at reversals are above the frequency band of the motion. Friction is therefore selected at
+//! the highest cut-off whose predicted parameter error is nearly the smallest. This prediction uses the friction that
+//! the study states. Its smoothed sign of the velocity is wide, so it is not sensitive to velocity noise. With the
+//! selected friction, the prediction can change: velocity noise blurs a narrow smoothed sign, and other terms
+//! compensate for this. Friction is therefore selected again, once, in two cases: at a lower cut-off if the velocity
+//! noise exceeds a small ratio of the width of the smoothed sign, or at a clearly higher cut-off. With the rows of that
+//! cut-off, each joint gets the friction with the lower Bayesian information criterion (Schwarz, Annals of Statistics 6
+//! (1978) 461). Rows at a lower cut-off contain less information, so terms that they add need stronger evidence.
 
 use super::choices::{Choices, FrictionChoice};
 use super::decision::{Decision, Next};
@@ -55,7 +56,8 @@ impl Decision for CutoffOfFriction {
     }
 }
 
-/// The cut-off at which friction is selected again, hertz. Friction was selected at `before_hz`.
+/// Cut-off at which friction is selected again, hertz; `None` if it is not selected again. `before_hz` is the cut-off
+/// of the first selection.
 fn other_cutoff_hz(fit: &Fit<'_>, choices: &Choices, friction: &ChosenFriction, before_hz: f64) -> Option<f64> {
     let cutoff = choices.cutoff()?;
     if friction.joints.is_empty() {
@@ -71,8 +73,9 @@ fn other_cutoff_hz(fit: &Fit<'_>, choices: &Choices, friction: &ChosenFriction, 
     (is_lower && is_smeared(before_hz)).then_some(cutoff.cutoff_hz)
 }
 
-/// Whether position noise after a low-pass at `cutoff_hz` smears the narrowest smooth step. White noise of standard
-/// deviation σ gives the velocity noise `σ 2π √(2 f³ / 3 rate)`.
+/// Whether position noise after a low-pass at `cutoff_hz` blurs the narrowest smoothed sign of the friction. White
+/// position noise of standard deviation σ causes the velocity noise `σ 2π √(2 f³ / 3 rate)` with the cut-off f and the
+/// sample rate.
 fn is_step_smeared(logs: &Logs<'_>, friction: &ChosenFriction, cutoff_hz: f64, max_noise_ratio: f64) -> bool {
     let widths = friction.joints.iter().flat_map(|joint| joint.terms.iter().flatten()).filter_map(smooth_width);
     let narrowest = widths.fold(f64::INFINITY, f64::min);

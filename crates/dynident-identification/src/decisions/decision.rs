@@ -1,4 +1,4 @@
-//! One decision, and the driver of a list of them.
+//! Interface of a decision, and the loop that makes a list of decisions.
 
 use super::workspace::Workspace;
 use crate::bars::ErrorSource;
@@ -8,12 +8,12 @@ use nalgebra::DMatrix;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Proceed,
-    /// Start again at the top of the list, because a choice was revised.
+    /// Start again at the first decision of the list, because a choice was revised.
     StartAgain,
 }
 
 pub(crate) trait Decision: Sync {
-    /// Makes the choice if it is open, or revises it if the current fit requires it.
+    /// Makes the choice if it is still open, or revises it if the current fit requires this.
     ///
     /// # Errors
     /// Recordings cannot be read, or rows do not determine an estimate.
@@ -25,7 +25,7 @@ pub(crate) trait Decision: Sync {
     }
 }
 
-/// Makes the decisions of a list until none revises a choice.
+/// Makes the decisions of a list repeatedly, until no decision revises a choice.
 pub(crate) fn decide_all(decisions: &[&dyn Decision], work: &mut Workspace<'_, '_>) -> Result<(), IdentificationError> {
     'from_top: loop {
         for decision in decisions {

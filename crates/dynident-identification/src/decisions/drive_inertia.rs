@@ -1,4 +1,4 @@
-//! Decision: does the torque contain the inertia of the drives?
+//! Decision whether the torque contains the inertia of the drives.
 
 use super::choices::Drives;
 use super::decision::{Decision, Next};

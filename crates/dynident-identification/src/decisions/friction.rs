@@ -1,4 +1,4 @@
-//! Decision: friction terms, their constants, and the cut-off for a fit with them.
+//! Decision about friction terms, their constants, and the cut-off for a fit with these terms.
 
 use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};
@@ -34,7 +34,7 @@ impl Decision for Friction {
         let friction = match of_excerpt {
             None if !is_open => stated_friction(&passes, &robot)?,
             None => {
-                // The width of a friction step is visible mostly above the band of the motion.
+                // The width of the smoothed sign affects the torque mostly above the frequency band of the motion.
                 let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
                 let friction = friction_of_logs(&passes, &of_constants, &robot, grid)?;
                 cutoff = choose_cutoff(&logs, settings, &friction.model, training)?;

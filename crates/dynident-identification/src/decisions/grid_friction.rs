@@ -1,4 +1,5 @@
-//! Decision: friction on a grid of constants. It is sufficient to estimate a lag, in a third of the time.
+//! Decision about friction terms with constants on a grid. This is sufficient to estimate a lag and takes a third of
+//! the time.
 
 use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};

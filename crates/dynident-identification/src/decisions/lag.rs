@@ -1,4 +1,4 @@
-//! Decision: the lag of the torque in the rows of the fit.
+//! Decision about the lag of the torque that is compensated in the rows of the fit.
 
 use super::decision::{Decision, Next};
 use super::workspace::Workspace;
@@ -33,8 +33,8 @@ impl Decision for Lag {
     }
 }
 
-/// Estimates the lags of the joints together with the parameters. `None` if they cannot be compensated: rows of some
-/// joints are missing, or position noise biases the estimator and the lag.
+/// Estimates the lags of the joints together with all parameters. `None` if lags cannot be compensated: rows of some
+/// joints are missing, or position noise biases the estimator and therefore the lag.
 pub(super) fn free_lag(fit: &Fit<'_>, training: &[usize]) -> Result<Option<LagFit>, IdentificationError> {
     let Fit { logs, training: rows, estimation, settings } = fit;
     if rows.joints.len() != rows.model.dof() || !settings.estimation.estimator.reads_filtered_rows() {

@@ -1,10 +1,11 @@
-//! Decision: the lag that is compensated before friction is selected.
+//! Decision about the lag that is compensated before friction is selected.
 //!
-//! Selecting friction takes most of the time, so the lag is first estimated with friction on a grid. Friction that is
-//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which itself acts late.
-//! Conversely, friction outside of the stated terms looks like a lag. So a lag that is significant with all friction
-//! terms is estimated with friction without memory. A lag that is significant only with the stated terms is accepted if
-//! it lowers the Bayesian information criterion of the fit with all terms.
+//! The selection of friction takes most of the time, so the lag is first estimated with friction terms whose constants
+//! are on a grid. Friction that is selected from rows with a lag can compensate this lag, above all Maxwell-slip
+//! friction, which responds with a delay. Conversely, friction that the stated terms do not contain looks like a lag.
+//! Therefore there are two cases. A lag that is significant with all friction terms is estimated with friction without
+//! hysteresis. A lag that is significant only with the stated terms is accepted if it lowers the Bayesian information
+//! criterion of the fit with all terms.
 
 use super::choices::FrictionChoice;
 use super::cutoff::Cutoff;
@@ -48,8 +49,8 @@ impl Decision for LagBeforeFriction {
             return Ok(Next::Proceed);
         }
 
-        // Revise the common lag with memoryless friction until it is no longer significant. Lags of single joints need
-        // fully selected friction.
+        // Revise the common lag with friction without hysteresis until the remaining lag is not significant. Different
+        // lags of single joints can only be estimated with the final friction.
         let candidates = work.settings.lags;
         let common = without_lag.choices.with_open_friction().with_lag(LagRounds::of(LagCandidates::Common));
         let mut with_lag = without_lag.trial(common);
@@ -70,7 +71,7 @@ impl Decision for LagBeforeFriction {
     }
 }
 
-/// Whether the rows of the fit show a significant common lag.
+/// Whether the rows of the fit have a significant lag that is common to all joints.
 fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> {
     let training = work.training;
     let fit = work.fit()?;

@@ -1,7 +1,8 @@
-//! Decisions of the training logs before the last fit: drive inertia, cut-off, friction and lag.
+//! Decisions that are made from the training logs before the last fit: drive inertia, cut-off, friction and lag.
 //!
-//! An open [`Decision`] is made from the rows under the current choices. A decision that revises a choice reopens the
-//! choices that depend on it. The driver then starts again at the top of the list, until no decision revises a choice.
+//! A [`Decision`] is made from the rows that result from the choices so far. A decision that revises a choice reopens
+//! the choices that depend on it. Then the decisions start again at the beginning of the list, until no decision
+//! revises a choice.
 
 mod choices;
 mod cutoff;

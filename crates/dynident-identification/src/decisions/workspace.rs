@@ -1,4 +1,4 @@
-//! Rows and fits under the current choices.
+//! Rows and fits that result from the choices made so far.
 
 use super::choices::{Choices, Drives, FrictionChoice};
 use crate::error::IdentificationError;
@@ -45,10 +45,10 @@ impl<'w> Job<'w> {
 pub(crate) struct Workspace<'a, 'w> {
     pub(super) task: &'a IdentificationTask,
     pub(super) training: &'w [usize],
-    /// Settings of the task with the lag in use.
+    /// Settings of the task with the lag that is currently compensated.
     pub(super) settings: IdentificationSettings,
     pub(super) choices: Choices,
-    /// The fit under the choices; `None` until needed.
+    /// Fit with the choices made so far; `None` until it is needed.
     pub(super) fit: Option<Fit<'a>>,
     /// Lags in the rows of the fit, after the lag was decided.
     pub(super) lag_fit: Option<LagFit>,
@@ -56,7 +56,8 @@ pub(crate) struct Workspace<'a, 'w> {
     pub(crate) logs_s: f64,
     job: Job<'w>,
     execution: Execution<'a>,
-    /// Logs with the lag in use, one entry per cut-off; the first has the cut-off that the spectra suggest.
+    /// Logs with the currently compensated lag, one entry for each cut-off. The first entry has the cut-off from the
+    /// spectra.
     logs: Vec<Logs<'a>>,
 }
 
@@ -97,7 +98,7 @@ impl<'a, 'w> Workspace<'a, 'w> {
         trial
     }
 
-    /// Adopts the choices of a trial: its lag is compensated, and its grid friction is a start.
+    /// Takes the choices of a trial: its lag is compensated, and its grid friction is the start for the selection.
     pub(super) fn adopt(&mut self, trial: Self) {
         let Workspace { mut choices, logs, .. } = trial;
         if let FrictionChoice::Grid(grid) = core::mem::replace(&mut choices.friction, FrictionChoice::Open) {
@@ -125,13 +126,13 @@ impl<'a, 'w> Workspace<'a, 'w> {
         self.job.arm()
     }
 
-    /// Drive inertia and the robot with it; as stated while the decision is open.
+    /// Choice of drive inertia, and the robot with it; the robot as stated while the choice is open.
     pub(super) fn drives(&self) -> Drives {
         let stated = || Drives { robot: self.task.robot.clone(), choice: None };
         self.choices.drives.clone().unwrap_or_else(stated)
     }
 
-    /// The logs with this cut-off, or with that of the spectra. A stored motion is not read again.
+    /// The logs with this cut-off, or with the cut-off from the spectra. A motion in memory is not read again.
     pub(super) fn logs_at(&mut self, cutoff_hz: Option<f64>) -> Result<Logs<'a>, IdentificationError> {
         if self.logs.is_empty() {
             let of_arm_hz = self.job.arm().and_then(KnownArm::cutoff_hz);
@@ -178,7 +179,7 @@ impl<'a, 'w> Workspace<'a, 'w> {
         };
         let mut fit = Fit { logs, training: rows, estimation, settings: settings.clone() };
         if matches!(self.choices.friction, FrictionChoice::Grid(_)) {
-            // A later fit replaces this one, so its position noise is acceptable.
+            // A later fit replaces this one, so the effect of position noise on it is acceptable.
             take_estimator(&mut fit);
             return Ok(fit);
         }

@@ -5,7 +5,7 @@ pub enum Channels {
     Position,
     /// Torques alone.
     Torque,
-    /// Both.
+    /// Positions and torques.
     Both,
 }
 
@@ -14,7 +14,7 @@ impl Channels {
         [Self::Position, Self::Torque].into_iter().filter(move |one| self == Self::Both || self == *one)
     }
 
-    /// Torque for position and the reverse; `None` for both.
+    /// Torque for position and position for torque; `None` for both.
     pub(super) fn other(self) -> Option<Self> {
         match self {
             Self::Position => Some(Self::Torque),
@@ -23,7 +23,7 @@ impl Channels {
         }
     }
 
-    /// The channels in a sentence.
+    /// Name of the channels in a sentence.
     pub fn text(self) -> &'static str {
         match self {
             Self::Position => "the position",

@@ -1,5 +1,6 @@
-//! Confirmation of a hypothesis against three causes that look like a mistake: another step of dry friction, a
-//! description with usual errors, and placeholder bodies, for which another rate compensates.
+//! Confirmation of a hypothesis about a mistake. Three other causes can look like a mistake: another width of the
+//! smoothed sign of dry friction, usual errors of the robot description, and placeholder bodies in the description,
+//! which another sample rate can compensate.
 
 use super::error::DiagnosisError;
 use super::hypothesis::{CorrectedStudy, Hypothesis};
@@ -12,9 +13,10 @@ use super::span::root_mean_square;
 use super::usual_errors::torques_of_likely_robots;
 use crate::consistent::ConsistencySettings;
 
-/// Replaces the result of a search by the study as `written`, with the friction steps that its rows need, if the
-/// hypothesis of the search is not confirmed, or if the search found no hypothesis and these steps differ from the
-/// study's. `None` if the search is confirmed. `believed` is the study of the search's best hypothesis.
+/// Replaces the result of a search by the study as `written`, with refitted widths of the smoothed friction sign, in
+/// two cases: the hypothesis of the search is not confirmed, or the search found no hypothesis and the refitted widths
+/// differ from those of the study. `None` if the result of the search remains. `believed` is the study of the search's
+/// best hypothesis.
 pub(super) fn unless_confirmed(
     written: &CorrectedStudy,
     believed: &CorrectedStudy,
@@ -35,8 +37,9 @@ pub(super) fn unless_confirmed(
     Ok(Some((own_steps, Search { as_written, best: None, alike: Vec::new(), tried: search.tried })))
 }
 
-/// Whether a hypothesis is better where each has its own steps. Placeholder bodies support another rate as much as
-/// described bodies do, so the consistent fit has to improve.
+/// Whether the hypothesis `best` is clearly better than the study as written if both have refitted friction widths.
+/// With placeholder bodies, a wrong sample rate can also improve the agreement with the description; for another rate,
+/// the consistent fit itself must therefore improve.
 fn is_clear(as_written: &Hypothesis, best: &Hypothesis) -> bool {
     let (gain, limits) = (as_written.score() - best.score(), &best.settings.score);
     if best.mistakes.iter().all(|mistake| mistake.facts().is_other_rate) {
@@ -47,8 +50,9 @@ fn is_clear(as_written: &Hypothesis, best: &Hypothesis) -> bool {
     }
 }
 
-/// Whether a hypothesis that only the nominal bodies support gains clearly more than with any robot whose description
-/// has usual errors, in the motion of the study as `written` and without any mistake.
+/// Whether the improvement by a hypothesis is clearly larger than the improvement that it would reach by chance. This
+/// matters if the improvement comes only from the agreement with the nominal bodies. By chance means: for random robots
+/// that differ from the description by usual errors and move as in the study as `written`, without any mistake.
 fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, best: &Hypothesis) -> bool {
     let limits = &written.settings.score;
     let by_bodies = as_written.nominal_score() - best.nominal_score();
@@ -66,7 +70,7 @@ fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, bes
             by_nominal.iter().zip(&torque).zip(left).map(|((by, torque), left)| by.hypot(left * torque)).collect();
         score(&noisy, &torque)
     };
-    // The motion is the same for all robots.
+    // The motion is the same for all random robots.
     let under = |mistakes: Vec<Mistake>| {
         let study = written.without_all(&mistakes);
         nominal_torque(&study.robot, &study.rows).map(|nominal| (mistakes, nominal))
@@ -83,7 +87,7 @@ fn is_beyond_usual_errors(written: &CorrectedStudy, as_written: &Hypothesis, bes
     by_bodies >= torques.map(gain).fold(0.0, f64::max) + limits.min_gain
 }
 
-/// The same mistakes, the last one with each number that a search could find for another robot.
+/// The same list of mistakes, once for each number of the last mistake that a search could find for another robot.
 fn with_other_numbers(mistakes: &[Mistake]) -> Vec<Vec<Mistake>> {
     let Some((last, before)) = mistakes.split_last() else { return vec![Vec::new()] };
     let others = last.facts().other_numbers;

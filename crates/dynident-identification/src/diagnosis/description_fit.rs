@@ -1,4 +1,5 @@
-//! Comparison of each joint's torque with the nominal bodies: unit of the torque, another robot.
+//! Comparison of each joint's torque with the torque of the nominal bodies, to find a wrong unit of the torque or a
+//! description of another robot.
 
 use super::friction_spans::FrictionSpans;
 use super::motion_rows::MotionRows;
@@ -9,7 +10,7 @@ use crate::diagnosis_settings::DescriptionSettings;
 use dynident_dynamics::ParametricModel;
 use nalgebra::DVector;
 
-/// Units that are mistaken for Nm, and their values, Nm.
+/// Units that are often mistaken for Nm, with their values in Nm.
 const UNITS_OF_TORQUE: [(&str, f64); 7] = [
     ("mNm", 1e-3),
     ("Ncm", 1e-2),
@@ -19,26 +20,27 @@ const UNITS_OF_TORQUE: [(&str, f64); 7] = [
     ("ozf in", 7.061_552e-3),
     ("kNm", 1e3),
 ];
-/// Fit of each joint's torque by the torque of the nominal bodies times a separate factor.
+/// Fit of each joint's torque by the torque of the nominal bodies (of the robot description) times a factor for this
+/// joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescriptionFit {
-    /// Factors on the torque columns for which the nominal bodies explain them best, one for each joint; `None` where
-    /// the bodies explain too little.
+    /// Factor on the torque columns of each joint with which the nominal bodies explain them best; `None` if the bodies
+    /// explain too little.
     pub scale: Vec<Option<f64>>,
-    /// Explained share of the sum of squares of each joint's torque, without friction, drive inertia and offset; `None`
-    /// where even the best bodies explain little of it.
+    /// Share of the sum of squares of each joint's torque that the nominal bodies explain, after friction, drive
+    /// inertia and offset are removed; `None` if even the best bodies explain little of it.
     pub explained: Vec<Option<f64>>,
-    /// Smallest share of the best explained joint over robots with usual errors of this description, in this motion;
-    /// `None` where this was not needed.
+    /// Explained share of the best explained joint for robots that differ from this description by usual errors, in
+    /// this motion: the smallest value of several random robots. `None` if it was not needed.
     pub least_of_own: Option<f64>,
-    /// One wrong mass that explains the torques better than another unit of most of them.
+    /// A single wrong mass that explains the torques better than another unit of most torques.
     pub wrong_mass: Option<WrongMass>,
     pub(super) settings: DescriptionSettings,
 }
 
 impl DescriptionFit {
     /// Joints whose torque is not in newton metres if the description is nearly correct. Empty unless most of the
-    /// comparable joints agree, since single bodies may be described badly.
+    /// comparable joints agree, because the description of single bodies may be bad.
     pub fn joints_in_another_unit(&self) -> Vec<usize> {
         let max_scale = self.settings.max_scale;
         let is_far = |scale: f64| !(max_scale.recip()..=max_scale).contains(&scale);
@@ -47,7 +49,7 @@ impl DescriptionFit {
         if 2 * far.len() > compared { far } else { Vec::new() }
     }
 
-    /// The unit of most comparable joints, within usual errors of descriptions, and its value, Nm (N); `None` if the
+    /// The unit of most comparable joints (within usual errors of descriptions) and its value, Nm (N). `None` if the
     /// factors differ from joint to joint, as for motor currents.
     pub fn common_unit(&self) -> Option<(&'static str, f64)> {
         let DescriptionSettings { max_unit_error, max_unit_spread, .. } = self.settings;
@@ -61,23 +63,23 @@ impl DescriptionFit {
         UNITS_OF_TORQUE.iter().find(is_common).copied()
     }
 
-    /// The joint that the bodies explain best, and the explained share.
+    /// The joint whose torque the nominal bodies explain best, and the explained share.
     pub fn best_explained(&self) -> Option<(usize, f64)> {
         let shares = self.explained.iter().enumerate().filter_map(|(joint, share)| Some((joint, (*share)?)));
         shares.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Whether the bodies, at any scale, explain no joint's torque, although they would for any robot that they
-    /// describe with usual errors.
+    /// Whether the nominal bodies, with any factor, explain no joint's torque, although they would do so for any robot
+    /// that differs from the description by usual errors.
     pub fn is_of_another_robot(&self) -> bool {
         let least = self.least_of_own.unwrap_or(f64::INFINITY).min(self.settings.min_explained_of_best);
         self.best_explained().is_some_and(|(_, share)| share < least)
     }
 }
 
-/// Fits each joint's torque by the nominal bodies' torque times a factor, with viscous and Coulomb friction, drive
-/// inertia and an offset; `None` while a body's inertials are unknown or the bodies need no torque at all. `left` is
-/// the unexplained share of each joint's torque by the best robot of this description.
+/// Fits each joint's torque by the torque of the nominal bodies times a factor, with viscous and Coulomb friction,
+/// drive inertia and an offset. `None` if inertial parameters of a body are unknown or the bodies require no torque.
+/// `left` is the unexplained share of each joint's torque for the best physically consistent robot.
 pub(super) fn description_fit(
     robot: &ParametricModel,
     rows: &MotionRows,
@@ -108,14 +110,14 @@ pub(super) fn description_fit(
 
 #[derive(Default)]
 struct JointFit {
-    /// Unexplained share of the torque's sum of squares without friction.
+    /// Unexplained share of the sum of squares of the torque, after friction is removed.
     left: f64,
     scale: Option<f64>,
     explained: Option<f64>,
 }
 
-/// Fits one joint: its torque `tau`, the same and that of the bodies without friction, and the unexplained share by
-/// the best robot.
+/// Fits one joint. `tau` is its torque, `torque` is the same without friction, `bodies` is the torque of the nominal
+/// bodies without components that look like friction, and `best_left` is the unexplained share for the best robot.
 fn joint_fit(
     tau: &[f64],
     torque: &DVector<f64>,
@@ -137,16 +139,16 @@ fn joint_fit(
     }
 }
 
-/// Share of the sum of squares of torque and noise that the bodies' torque times a positive factor explains; zero for
-/// bodies that need no torque.
+/// Share of the sum of squares of torque and noise that the torque of the bodies times a positive factor explains; zero
+/// for bodies that require no torque.
 fn share_explained(torque: &DVector<f64>, bodies: &DVector<f64>, noise: f64) -> f64 {
     let along = torque.dot(bodies).max(0.0);
     let all = (torque.norm_squared() + noise) * bodies.norm_squared();
     if all > 0.0 { along * along / all } else { 0.0 }
 }
 
-/// Smallest explained share of the best explained of `joints`, over robots with usual errors of the description, in the
-/// motion of these rows and with the unexplained share `left` as noise.
+/// Explained share of the best explained joint among `joints`: the smallest value over random robots that differ from
+/// the description by usual errors. They move as in these rows, and the unexplained share `left` is added as noise.
 fn least_of_own(
     robot: &ParametricModel,
     rows: &MotionRows,

@@ -1,26 +1,27 @@
-//! Columns that differ from the study: one column for two joints, torques without a sign.
+//! Columns of a log that are not what the study states: the same column for two joints, or torques without a sign.
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
 use super::span::dot;
 use crate::diagnosis_settings::ChannelSettings;
 
-/// Largest relative difference of duplicates: rounding of filters.
+/// Maximum relative difference between duplicate columns, which rounding in the filters causes.
 const MAX_DIFFERENCE: f64 = 1.0e-6;
-/// The same for a position and a torque, which have different filters.
+/// Maximum relative difference between a position and a torque from the same column, which pass different filters.
 const MAX_DIFFERENCE_OF_FILTERS: f64 = 1.0e-2;
 
-/// Two joints with the same column.
+/// Two joints whose values come from the same column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DuplicateChannel {
-    /// Positions or torques; both if the position of the first joint is the torque of the second.
+    /// Whether the positions or the torques are duplicates; both if the position of the first joint is the torque of
+    /// the second.
     pub channels: Channels,
-    /// Numbers of the two joints.
+    /// Indices of the two joints.
     pub joints: [usize; 2],
 }
 
-/// Joints with the same column, up to a factor, where much of the torque of one of them is unexplained; `left` is the
-/// unexplained share of each joint's torque. A position and a torque may also be one column.
+/// Finds joints with the same column, up to a factor, if much of the torque of one of them is unexplained. A position
+/// and a torque may also come from one column. `left` is the unexplained share of each joint's torque.
 pub(super) fn duplicate_channels(rows: &MotionRows, left: &[f64], settings: &ChannelSettings) -> Vec<DuplicateChannel> {
     let is_compared = |a: usize, b: usize| left[a].max(left[b]) > settings.min_unexplained_of_duplicate;
     let mut found = Vec::new();
@@ -43,19 +44,19 @@ pub(super) fn duplicate_channels(rows: &MotionRows, left: &[f64], settings: &Cha
     found
 }
 
-/// Whether two columns that are not constant are multiples of each other, up to offsets.
+/// Whether two columns that are not constant are equal up to a factor and an offset.
 fn is_multiple(a: &[f64], b: &[f64], max_difference: f64) -> bool {
     let [a, b] = [a, b].map(|values| {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         values.iter().map(|value| value - mean).collect::<Vec<f64>>()
     });
     let [aa, ab, bb] = [dot(&a, &a), dot(&a, &b), dot(&b, &b)];
-    // The square of the sine of their angle.
+    // The squared sine of the angle between the columns is below the limit.
     aa > 0.0 && bb > 0.0 && aa * bb - ab * ab < max_difference * max_difference * aa * bb
 }
 
 /// Whether all torques are magnitudes: never negative although the joints move back and forth, and not explained by any
-/// robot. `left_of_all` is the unexplained share of all torque.
+/// physically consistent robot. `left_of_all` is the unexplained share of the torque of all joints.
 pub(super) fn has_lost_signs(rows: &MotionRows, left_of_all: f64, settings: &ChannelSettings) -> bool {
     let is_back_and_forth = |dq: &[f64]| dq.iter().any(|&dq| dq > 0.0) && dq.iter().any(|&dq| dq < 0.0);
     let is_positive = |tau: &[f64]| {

@@ -1,5 +1,5 @@
-//! Residuals of several fits to the torque of some instants: separate parameters of each joint, one set of base
-//! parameters, a consistent robot, the nominal bodies.
+//! Residuals of four fits to the torque at some instants: separate parameters of each joint, one set of base
+//! parameters, a physically consistent robot, and the nominal bodies.
 
 use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
@@ -9,29 +9,30 @@ use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
 use dynident_rows::predicted_torque;
 
-/// Residuals of each joint's torque, root mean squares, Nm (N), at least a hundredth of the torque.
+/// Residuals of each joint's torque in several fits: root mean squares, Nm (N), at least a hundredth of the torque.
 #[derive(Clone, Debug)]
 pub(super) struct Explanation {
-    /// Of the torque itself.
+    /// Root mean square of the torque itself.
     pub(super) torque: Vec<f64>,
-    /// By separate parameters of each joint.
+    /// Residual with separate parameters of each joint.
     pub(super) alone: Vec<f64>,
-    /// Number of independent instants per parameter of a joint, `n/p`.
+    /// Number of independent instants divided by the number of parameters of a joint, `n/p`.
     instants_per_parameter: Vec<f64>,
-    /// By one set of base parameters, consistent or not.
+    /// Residual with one set of base parameters, physically consistent or not.
     pub(super) free: Vec<f64>,
-    /// That set.
+    /// These base parameters.
     pub(super) free_parameters: Vec<f64>,
-    /// By the best physically consistent set; empty without a fit.
+    /// Residual with the best physically consistent set; empty without a fit.
     pub(super) consistent: Vec<f64>,
-    /// That set; empty without a fit.
+    /// Base parameters of this set; empty without a fit.
     consistent_parameters: Vec<f64>,
-    /// By the nominal bodies with friction fitted joint by joint; empty if a body is unknown.
+    /// Residual with the nominal bodies and friction that is fitted joint by joint; empty if a body is unknown.
     pub(super) nominal: Vec<f64>,
 }
 
 impl Explanation {
-    /// Fits the torque of `rows` by `robot`; also by a consistent robot if `consistency` is given.
+    /// Fits the torque of `rows` with the model `robot`; also with a physically consistent set if `consistency` is
+    /// given.
     pub(super) fn new(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -59,18 +60,18 @@ impl Explanation {
         })
     }
 
-    /// The best physically consistent set; without one, the free set.
+    /// Base parameters of the best physically consistent set; without such a set, those of the unconstrained fit.
     pub(super) fn parameters(&self) -> &[f64] {
         if self.consistent_parameters.is_empty() { &self.free_parameters } else { &self.consistent_parameters }
     }
 
-    /// `Σ_j ln(unexplained share of joint j)` for one set of base parameters.
+    /// Score of the fit with one set of base parameters: `Σ_j ln(unexplained share of joint j)`.
     pub(super) fn free_score(&self) -> f64 {
         score(&self.free, &self.torque)
     }
 
-    /// Residuals of separate parameters of each joint, corrected for overfitting: they contain only `√(1 − p/n)` of the
-    /// noise.
+    /// Residuals with separate parameters of each joint, corrected for overfitting: n instants and p parameters leave
+    /// only `√(1 − p/n)` of the noise.
     pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
         let noise_share = |ratio: &f64| (1.0 - ratio.max(1.0).recip()).max(0.1).sqrt();
         let residuals = self.alone.iter().zip(&self.instants_per_parameter);
@@ -81,8 +82,8 @@ impl Explanation {
         self.instants_per_parameter.iter().map(|ratio| *ratio >= settings.min_instants_per_parameter).collect()
     }
 
-    /// Factor on the required improvement: the logarithm of a residual varies by `√(p/2n)` from log to log, more with
-    /// few independent instants.
+    /// Factor on the improvement that a hypothesis needs. The logarithm of a residual varies by `√(p/2n)` from log to
+    /// log (p parameters, n independent instants), so it varies more with few instants.
     pub(super) fn margin(&self, settings: &ScoreSettings) -> f64 {
         let least = self.instants_per_parameter.iter().copied().fold(f64::INFINITY, f64::min);
         (settings.min_instants_per_parameter / least).clamp(1.0, settings.max_margin)
@@ -101,7 +102,7 @@ pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64
     (0..robot.dof()).map(one).collect()
 }
 
-/// Base parameters with zero torque terms.
+/// The base parameters with all friction and drive parameters set to zero.
 pub(super) fn without_terms(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let of_body = |column: &Column| matches!(column, Column::Body { .. });
     robot

@@ -1,4 +1,4 @@
-//! Torque of each joint without friction, drive inertia and offset.
+//! Projection that removes friction, drive inertia and offset from the torque of each joint.
 
 use super::motion_rows::MotionRows;
 use super::span::Span;
@@ -6,11 +6,12 @@ use crate::friction::step_of_joint;
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
-/// The spans of `1, q̇, s(q̇), q̈` over the rows, one for each joint, with the step `s` of the joint's terms.
+/// For each joint, the space spanned by the columns `1, q̇, s(q̇), q̈` over the rows, with the joint's smoothed sign
+/// function `s`.
 pub(super) struct FrictionSpans(Vec<Span>);
 
 impl FrictionSpans {
-    /// `None` without rows.
+    /// Computes the spaces; `None` without rows.
     pub(super) fn new(robot: &ParametricModel, rows: &MotionRows) -> Option<Self> {
         let of_joint = |joint: usize| {
             let (dq, ddq) = (&rows.dq[joint], &rows.ddq[joint]);
@@ -25,7 +26,7 @@ impl FrictionSpans {
         (0..rows.dq.len()).map(of_joint).collect::<Option<_>>().map(Self)
     }
 
-    /// A torque of this joint without its projection on the span, Nm (N).
+    /// Torque of a joint minus its projection on this space, Nm (N).
     pub(super) fn remove(&self, joint: usize, torque: &[f64]) -> DVector<f64> {
         self.0[joint].outside(&DVector::from_column_slice(torque))
     }

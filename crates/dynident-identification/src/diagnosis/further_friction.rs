@@ -1,4 +1,4 @@
-//! Residual with further friction laws, among which identification selects automatically.
+//! Residual with further friction laws, from which an identification selects automatically.
 
 use super::explanation::{predicted, without_terms};
 use super::motion_rows::MotionRows;
@@ -7,8 +7,8 @@ use crate::friction::{FURTHER_LAWS, FurtherLaws};
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
-/// Ratio of a joint's residual with [further friction laws](FurtherLaws) to its residual by base parameters `theta`, at
-/// most 1.
+/// Residual of a joint with [further friction laws](FurtherLaws) divided by its residual with the base parameters
+/// `theta`, at most 1.
 pub(super) fn ratio_with_further_friction(
     robot: &ParametricModel,
     rows: &MotionRows,

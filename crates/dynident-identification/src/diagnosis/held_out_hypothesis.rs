@@ -1,5 +1,5 @@
-//! Mistakes of one held-out log, such as another format or exchanged cables. The base parameters of the training logs
-//! are known, so the residual is the only evidence.
+//! Search for a mistake that only one held-out log has, such as another format or exchanged cables. The base parameters
+//! from the training logs are known, so the residual with these parameters is the only evidence.
 
 use super::channels::Channels;
 use super::explanation::predicted;
@@ -11,21 +11,21 @@ use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
-/// Smallest unexplained share of a joint's torque that is compared.
+/// Minimum unexplained share of a joint's torque; smaller shares are treated as equal to it.
 const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
-/// A mistake of a held-out log. Corrected, the parameters of the training logs explain the log.
+/// A mistake of one held-out log. After its correction, the parameters from the training logs explain the log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOutHypothesis {
-    /// Number of the recording.
+    /// Index of the recording.
     pub log: usize,
     /// The mistake.
     pub mistake: Mistake,
     /// Other mistakes that explain the log equally well.
     pub alike: Vec<Mistake>,
-    /// Residual of the study as written, root mean square of all joints, Nm.
+    /// Root mean square residual of all joints with the study as written, Nm.
     pub left_as_written: f64,
-    /// The same without the mistake.
+    /// Root mean square residual of all joints after the mistake is corrected, Nm.
     pub left_without: f64,
 }
 
@@ -39,13 +39,13 @@ pub(super) struct KnownRobot<'a> {
 }
 
 struct Residual {
-    /// `Σ_j ln(unexplained share of joint j)` and the cost of broken limits.
+    /// Sum `Σ_j ln(unexplained share of joint j)`, plus the cost of exceeded joint limits.
     score: f64,
-    /// Root mean square of all joints, Nm.
+    /// Root mean square residual of all joints, Nm.
     rms: f64,
-    /// Unexplained share of each joint's torque, at least that of the training logs; 1 for a joint without torque.
+    /// Unexplained share of each joint's torque, at least the share in the training logs; 1 for a joint without torque.
     left: Vec<f64>,
-    /// Unexplained shares in the training logs, at least [`MIN_RESIDUAL_SHARE`].
+    /// Unexplained share of each joint's torque in the training logs, at least [`MIN_RESIDUAL_SHARE`].
     trained: Vec<f64>,
 }
 
@@ -85,8 +85,8 @@ impl Candidate {
         self.residual.score + self.rarity
     }
 
-    /// Whether it is clearly better than the log `as_written`, and closes half of the gap to the training logs or
-    /// explains every joint. Otherwise another cause is likelier.
+    /// Whether the residual is clearly smaller than with the log `as_written`. In addition, the correction must close
+    /// half of the gap to the training logs or explain every joint; otherwise another cause is more probable.
     fn is_clear(&self, as_written: &Residual, settings: &DiagnosisSettings) -> bool {
         let trained: f64 = as_written.trained.iter().map(|left| left.ln()).sum();
         (self.score() < 0.5 * (as_written.score + trained) || self.residual.is_explained(settings))
@@ -95,9 +95,9 @@ impl Candidate {
     }
 }
 
-/// Searches one mistake in recording number `log` that explains why its residual is larger than that of the training
-/// logs. `rows` are motion and torque of this log at some instants; `lag_search` gives them with the torque shifted in
-/// time, if the log is long enough.
+/// Searches for one mistake in recording number `log` that explains why its residual is larger than in the training
+/// logs. `rows` contains motion and torque of this log at some instants. `lag_search` provides them with the torque
+/// shifted in time, if the log is long enough.
 pub(super) fn held_out_hypothesis(
     known: KnownRobot<'_>,
     rows: &MotionRows,
@@ -125,7 +125,7 @@ pub(super) fn held_out_hypothesis(
     let late = late.filter(|late| late.score() < least && late.is_clear(&as_written, settings));
     let others = if late.is_some() { &tried[..] } else { tried.get(1..)? };
     let best = late.as_ref().or(tried.first()).filter(|best| best.is_clear(&as_written, settings))?;
-    // Known parameters determine every number to within the noise.
+    // With known parameters, the residual determines every free number to within the noise.
     let between = best.mistake.with_best_number(|mistake| without(mistake.clone()).residual.score).map(without);
     let limit = best.residual.score - settings.held_out.min_gain_of_number;
     let between = between.filter(|found| found.residual.score < limit);
@@ -137,7 +137,8 @@ pub(super) fn held_out_hypothesis(
     Some(HeldOutHypothesis { log, mistake, alike, left_as_written: as_written.rms, left_without: residual.rms })
 }
 
-/// The log with the lag of all torques that has the smallest residual; `None` for a lag that a fit compensates.
+/// The log with its torques shifted by the lag that gives the smallest residual; `None` if the lag is short enough to
+/// be compensated by a fit.
 fn late_torque(known: KnownRobot<'_>, lag_search: &LagSearch<'_>) -> Option<Candidate> {
     let joints: Vec<usize> = (0..known.robot.dof()).collect();
     let at = |lag_s: f64| Residual::new(known, &lag_search.rows(&joints, Channels::Torque, lag_s, INSTANTS));

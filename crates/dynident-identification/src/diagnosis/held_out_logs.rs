@@ -1,4 +1,4 @@
-//! Payloads and mistakes of single held-out logs.
+//! Search for payloads and mistakes of single held-out logs.
 
 use super::error::DiagnosisError;
 use super::explanation::{Explanation, predicted};
@@ -21,7 +21,7 @@ pub(super) struct TrainingResult<'a> {
     pub(super) model: &'a RegressorModel,
     pub(super) rows: &'a MotionRows,
     pub(super) as_written: &'a Hypothesis,
-    /// Base parameters by least squares from all rows; `None` if the model differs from the study's.
+    /// Base parameters from all rows by least squares; `None` if the model differs from that of the study.
     pub(super) theta: Option<&'a [f64]>,
     pub(super) consistency: &'a ConsistencySettings,
     /// The compensated lag of each joint's torque, s.
@@ -29,10 +29,10 @@ pub(super) struct TrainingResult<'a> {
     pub(super) settings: &'a DiagnosisSettings,
 }
 
-/// The payload or the mistake of each held-out log that explains it clearly better than the robot of the training logs
-/// and than one robot for all logs. It is reported only if neither the parameters from all rows nor
-/// those of a consistent robot ([`Hypothesis::parameters`]) explain the log: free parameters that the training motion
-/// does not excite predict nothing.
+/// The payload or the mistake of each held-out log that explains the log clearly better than two alternatives: the
+/// robot of the training logs, and one robot for all logs. It is reported only if neither the parameters from all rows
+/// nor those of a physically consistent robot ([`Hypothesis::parameters`]) explain the log. The reason: free parameters
+/// that the training motion does not excite cannot predict the torque of another motion.
 pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Result<HeldOutLogs, DiagnosisError> {
     let (robot, settings) = (&trained.model.parametric, trained.settings);
     let mut found = HeldOutLogs::default();
@@ -63,8 +63,8 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Re
     Ok(found)
 }
 
-/// Residual of this log by the best robot for the training logs and this log together, root mean square of all joints,
-/// Nm.
+/// Root mean square residual of all joints in this log, Nm, for the best single robot for the training logs and this
+/// log together.
 fn left_of_one_robot(rows: &MotionRows, trained: &TrainingResult<'_>) -> Result<f64, DiagnosisError> {
     let robot = &trained.model.parametric;
     let mut all = trained.rows.clone();

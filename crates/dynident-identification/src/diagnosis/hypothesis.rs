@@ -1,4 +1,4 @@
-//! A hypothesis about the logs: possible mistakes of the study, and the evidence for and against them.
+//! A hypothesis about the logs: possible mistakes of the study, with the evidence for and against them.
 
 use super::explanation::Explanation;
 use super::joint_fits::{JointFits, SharedMotion, score};
@@ -12,45 +12,48 @@ use crate::diagnosis_settings::{DiagnosisSettings, ScoreSettings};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 
-/// Corrections of some mistakes, and the residuals of the corrected samples.
+/// A hypothesis: a list of mistakes of the study, and the residuals after their correction.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
-    /// Corrected mistakes, in the order of their correction; empty for the study as written.
+    /// Mistakes in the order of their correction; empty for the study as written.
     pub mistakes: Vec<Mistake>,
-    /// Unexplained share of each joint's torque by the best physically consistent robot, 0 to 1 (root mean squares).
+    /// Unexplained share of each joint's torque for the best physically consistent robot, 0 to 1 (root mean squares).
     pub left: Vec<f64>,
-    /// The same for one set of base parameters, consistent or not.
+    /// Unexplained share of each joint's torque for one set of base parameters, physically consistent or not.
     pub free: Vec<f64>,
-    /// The same for separate parameters of each joint, corrected for overfitting.
+    /// Unexplained share of each joint's torque for separate parameters of each joint, corrected for overfitting.
     pub alone: Vec<f64>,
-    /// The same for the nominal bodies with friction fitted joint by joint; empty if a body is unknown.
+    /// Unexplained share of each joint's torque for the nominal bodies with friction fitted joint by joint; empty if a
+    /// body is unknown.
     pub nominal: Vec<f64>,
-    /// Whether there are enough instants for separate parameters, one entry for each joint.
+    /// For each joint, whether there are enough instants for separate parameters of this joint.
     pub own_parameters_tell: Vec<bool>,
-    /// Factor on the required improvement of another hypothesis; above 1 for few instants.
+    /// Factor on the improvement that another hypothesis needs; above 1 for few instants.
     pub margin: f64,
-    /// Unexplained share of the torque of all joints together by the best consistent robot, unweighted.
+    /// Unexplained share of the torque of all joints together for the best physically consistent robot, without
+    /// weights.
     pub left_of_all: f64,
-    /// Joints beyond their limits.
+    /// Joints that exceed their limits.
     pub beyond: Vec<BeyondLimit>,
-    /// Whether recorders have such a rate.
+    /// Whether the sample rate is plausible for a recorder.
     pub plausible_rate: bool,
-    /// `Σ_j ln(unexplained share of joint j)` for separate parameters of each joint, not corrected for
-    /// overfitting.
+    /// Sum `Σ_j ln(unexplained share of joint j)` for separate parameters of each joint, not corrected for overfitting.
     pub alone_score: f64,
-    /// Base parameters of the best consistent robot; those of `free` if no consistent robot was found.
+    /// Base parameters of the best physically consistent robot; if no such robot was found, those that belong to
+    /// `free`.
     pub parameters: Vec<f64>,
-    /// Range of the position factor of the last mistake within which the samples do not distinguish factors; `None`
-    /// without such a factor or such a search.
+    /// Range of the position factor of the last mistake within which the samples do not distinguish factors; `None` if
+    /// the mistake has no such factor or the range was not computed.
     pub factors_alike: Option<[f64; 2]>,
-    /// Logarithm of the growth of torques to which columns were added. This growth alone reduces unexplained shares.
+    /// Logarithm of the growth of torques to which the correction adds other columns. This growth alone reduces
+    /// unexplained shares.
     pub torque_growth: f64,
     pub(super) settings: DiagnosisSettings,
 }
 
 impl Hypothesis {
-    /// All evidence as one number, smaller is better: logarithms of unexplained shares, the cost of broken limits, and
-    /// the rarity of the mistakes.
+    /// All evidence as one number, smaller is better: logarithms of unexplained shares, a cost for exceeded joint
+    /// limits, and a cost for rare mistakes.
     pub fn score(&self) -> f64 {
         self.consistent_score() + self.other_evidence()
     }
@@ -60,40 +63,40 @@ impl Hypothesis {
         sum_of_logarithms(&self.left)
     }
 
-    /// The same for one set of base parameters, consistent or not.
+    /// `Σ_j ln(unexplained share of joint j)` for one set of base parameters, physically consistent or not.
     pub(super) fn free_score(&self) -> f64 {
         sum_of_logarithms(&self.free)
     }
 
-    /// The same for the nominal bodies; zero if a body is unknown.
+    /// `Σ_j ln(unexplained share of joint j)` for the nominal bodies; zero if a body is unknown.
     pub(super) fn nominal_score(&self) -> f64 {
         sum_of_logarithms(&self.nominal)
     }
 
-    /// The score without limits and rates.
+    /// The score without the costs of joint limits and sample rates.
     pub(super) fn torque_score(&self) -> f64 {
         self.score() - self.limit_cost()
     }
 
-    /// The score of the consistent fit alone.
+    /// The score of the physically consistent fit alone.
     pub(super) fn bodies_score(&self) -> f64 {
         self.consistent_score() + self.torque_growth
     }
 
-    /// Whether a mistake is tried only where a joint travels far beyond its range.
+    /// Whether the last mistake is only tried for joints that travel far beyond their range.
     pub(super) fn is_shown_by_travel(&self) -> bool {
         self.mistakes.iter().any(|mistake| matches!(mistake.facts().proof, Proof::Travel(_)))
     }
 
-    /// Whether the consistent fit has a far larger residual than separate parameters of each joint, if there are enough
-    /// instants for these.
+    /// Whether the physically consistent fit has a far larger residual than separate parameters of each joint. False if
+    /// there are not enough instants for separate parameters.
     pub fn is_unexplained(&self) -> bool {
         let ScoreSettings { few_instants_margin, max_log_ratio, .. } = self.settings.score;
         self.margin < few_instants_margin
             && self.consistent_score() - self.alone_score > max_log_ratio * self.left.len() as f64
     }
 
-    /// Lower bound of [`score`](Self::score) for any consistent robot.
+    /// Lower bound of [`score`](Self::score) for any physically consistent robot.
     pub(super) fn lower_bound(&self) -> f64 {
         self.free_score() + self.other_evidence()
     }
@@ -109,7 +112,7 @@ impl Hypothesis {
 }
 
 impl ScoreSettings {
-    /// The part of the score in addition to the fit of a robot.
+    /// The part of the score that does not depend on the fit of a physically consistent robot.
     fn other_evidence(&self, mistakes: &[Mistake], nominal_score: f64, torque_growth: f64, limit_cost: f64) -> f64 {
         let rarity: f64 = mistakes.iter().map(|mistake| mistake.facts().rarity).sum();
         self.nominal_weight * nominal_score + (1.0 + self.nominal_weight) * torque_growth + limit_cost + rarity
@@ -146,7 +149,7 @@ impl CorrectedStudy {
         Self { robot, rows, mistakes, torque_growth: 0.0, settings: *settings }
     }
 
-    /// The same with one more mistake corrected.
+    /// The study with one more mistake corrected.
     pub(super) fn without(&self, mistake: &Mistake) -> Self {
         let robot = mistake.corrected_robot(&self.robot).unwrap_or_else(|| self.robot.clone());
         let mistakes = self.mistakes.iter().chain([mistake]).cloned().collect();
@@ -160,7 +163,7 @@ impl CorrectedStudy {
         Self { robot, rows, mistakes, torque_growth: self.torque_growth + growth, settings: self.settings }
     }
 
-    /// The same with the friction steps that its rows need.
+    /// The study with the widths of smoothed friction signs that fit its rows best.
     pub(super) fn with_fitted_steps(&self) -> Result<Self, EstimationError> {
         let robot = with_fitted_steps(&self.robot, &self.rows, self.settings.acceptance.max_ratio_of_step)?;
         Ok(Self { robot, ..self.clone() })
@@ -170,9 +173,9 @@ impl CorrectedStudy {
         mistakes.iter().fold(self.clone(), |study, mistake| study.without(mistake))
     }
 
-    /// The [lower bound of the score](Hypothesis::lower_bound) if it is at most `limit`. The cheap separate parameters
-    /// of each joint exclude most hypotheses first. `motion` is that of the study before the last mistake, with the
-    /// torques of all joints for each joint.
+    /// The [lower bound of the score](Hypothesis::lower_bound) if it is at most `limit`. Separate parameters of each
+    /// joint are cheap to compute and exclude most hypotheses first. `motion` is the motion before the last mistake is
+    /// corrected; for each joint, it contains the torques of all joints.
     pub(super) fn lower_bound_within(&self, limit: f64, motion: &SharedMotion) -> Option<f64> {
         let (fits, settings) = (self.joint_fits(motion).ok()?, &self.settings.score);
         let limits = settings.limit_cost(&self.beyond(), self.has_plausible_rate());
@@ -184,13 +187,13 @@ impl CorrectedStudy {
         Some(fits.free_score().ok()? + other).filter(|bound| *bound <= limit)
     }
 
-    /// The [score of one set of base parameters](Hypothesis::free_score), with `motion` as for
-    /// [`lower_bound_within`](Self::lower_bound_within); infinite without a fit.
+    /// The [score of one set of base parameters](Hypothesis::free_score), with `motion` as in
+    /// [`lower_bound_within`](Self::lower_bound_within); infinite if the fit fails.
     pub(super) fn free_score(&self, motion: &SharedMotion) -> f64 {
         self.joint_fits(motion).and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
     }
 
-    /// The motion with the torques of all joints for each joint.
+    /// The motion of the study; for each joint, it contains the torques of all joints.
     pub(super) fn motion(&self) -> Result<SharedMotion, EstimationError> {
         let torques = |_| self.rows.tau.iter().map(Vec::as_slice).collect();
         SharedMotion::new(&self.robot, &self.rows, torques)
@@ -215,13 +218,13 @@ impl CorrectedStudy {
         is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz, &self.settings.motion)
     }
 
-    /// The hypothesis with a consistent fit.
+    /// The hypothesis with a physically consistent fit.
     pub(super) fn explained(self, consistency: &ConsistencySettings) -> Result<Explained, EstimationError> {
         let hypothesis = self.hypothesis(Some(consistency))?;
         Ok(Explained { study: self, hypothesis })
     }
 
-    /// The hypothesis, with a consistent fit only if `consistency` is given.
+    /// The hypothesis; a physically consistent fit is only computed if `consistency` is given.
     pub(super) fn hypothesis(&self, consistency: Option<&ConsistencySettings>) -> Result<Hypothesis, EstimationError> {
         let explained = Explanation::new(&self.robot, &self.rows, consistency)?;
         let best = if explained.consistent.is_empty() { &explained.torque } else { &explained.consistent };
@@ -247,7 +250,7 @@ impl CorrectedStudy {
     }
 }
 
-/// Leaves out joints without torque, whose share is zero.
+/// Sum of the logarithms. Joints without torque, whose share is zero, are omitted.
 fn sum_of_logarithms(shares: &[f64]) -> f64 {
     shares.iter().filter(|share| **share > 0.0).map(|share| share.ln()).sum()
 }

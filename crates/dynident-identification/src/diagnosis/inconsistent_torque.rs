@@ -1,5 +1,5 @@
-//! Torques that are inconsistent with those of the other joints: noise, another channel, a separate clock, or a gain
-//! that no hypothesis corrects.
+//! Torques that are inconsistent with the torques of the other joints: noise, another channel, a separate clock, or a
+//! gain that no hypothesis corrects.
 
 use super::error::DiagnosisError;
 use super::explanation::Explanation;
@@ -9,35 +9,35 @@ use super::motion_rows::MotionRows;
 use crate::diagnosis_settings::ChannelSettings;
 use dynident_dynamics::ParametricModel;
 
-/// A torque that is inconsistent with the robot of the other joints.
+/// A joint torque that no robot model explains together with the torques of the other joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InconsistentTorque {
-    /// The joint's number.
+    /// Index of the joint.
     pub joint: usize,
-    /// Unexplained share of its torque by one set of base parameters for all joints, with further friction laws where
-    /// these explain more.
+    /// Unexplained share of the joint's torque with one set of base parameters for all joints. Further friction laws
+    /// are used if they explain more.
     pub left: f64,
-    /// The same for separate parameters of the joint.
+    /// Unexplained share of the joint's torque with separate parameters of this joint.
     pub alone: f64,
-    /// Share of its torque from noise of the positions.
+    /// Share of the joint's torque that results from position noise.
     pub noise: f64,
     settings: ChannelSettings,
 }
 
 impl InconsistentTorque {
-    /// Whether it is independent of the motion.
+    /// Whether the torque is independent of the motion.
     pub fn is_motionless(&self) -> bool {
         self.alone > self.settings.min_independent_alone && self.left > self.settings.min_independent
     }
 
-    /// Whether it is so inconsistent that it does not belong to this robot.
+    /// Whether the torque is so inconsistent that it does not belong to this robot.
     pub fn is_foreign(&self) -> bool {
         self.unexplained_ratio() > self.settings.min_foreign_ratio
     }
 
-    /// Ratio of the joint's unexplained torque with one robot for all joints to that with separate parameters of the
-    /// joint. The second share includes the noise of the positions, which separate parameters fit, but one robot does
-    /// not.
+    /// Ratio of the joint's unexplained torque with one robot for all joints to the unexplained torque with separate
+    /// parameters of the joint. The effect of position noise is included in the latter, because separate parameters fit
+    /// this noise, but one robot does not.
     pub fn unexplained_ratio(&self) -> f64 {
         self.left / self.alone.hypot(self.noise).max(f64::MIN_POSITIVE)
     }
@@ -47,9 +47,10 @@ impl InconsistentTorque {
     }
 }
 
-/// The inconsistent torques of a hypothesis: those that are independent of the motion, or else the one with the largest
-/// ratio, since it spoils its neighbours. `robot` and `rows` are those of the hypothesis. `noise` computes the share of
-/// each joint's torque from noise of the positions; it is called only if needed.
+/// The inconsistent torques of a hypothesis: all torques that are independent of the motion; if there are none, only
+/// the torque with the largest ratio, because it disturbs the fit of the neighbouring joints. `robot` and `rows` belong
+/// to the hypothesis. `noise` computes the share of each joint's torque that results from position noise; it is called
+/// only if needed.
 pub(super) fn inconsistent_torques(
     hypothesis: &Hypothesis,
     robot: &ParametricModel,

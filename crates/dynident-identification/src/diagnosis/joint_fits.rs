@@ -1,5 +1,5 @@
-//! The rows of a hypothesis as a linear problem, the residuals of separate parameters of each joint, and those of one
-//! set of base parameters.
+//! Linear least-squares fits to the rows of a hypothesis: residuals with separate parameters of each joint, and
+//! residuals with one set of base parameters.
 
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, torque_of_bodies};
@@ -11,24 +11,24 @@ use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Rounds of weighting; the third one changes scores by less than 0.01.
+/// Number of reweighting rounds; a third round changes scores by less than 0.01.
 const WEIGHTING_ROUNDS: usize = 3;
-/// Added to the squares of columns of unit length: unexcited parameters stay at zero.
+/// Regularisation that is added to the squares of columns of unit length, so that unexcited parameters stay at zero.
 const RIDGE: f64 = 1.0e-10;
 
-/// Smallest residual as a share of the torque: otherwise rounding would decide in noise-free simulations.
+/// Minimum residual as a share of the torque. Without it, rounding errors would decide in noise-free simulations.
 const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
-/// A motion with several torques of each joint. One pass over the rows serves all hypotheses that differ in torque
-/// alone.
+/// A motion with several torques for each joint. One pass over the rows serves all hypotheses that differ only in the
+/// torque.
 pub(super) struct SharedMotion {
     panels: Arc<Panels>,
-    /// For each joint its columns, then its torques.
+    /// For each joint the triangular factor of its regressor columns and of all its torques.
     factors: Vec<TriangularFactor>,
 }
 
 impl SharedMotion {
-    /// The motion of `rows` with at least one of `torques` for each joint; the torques of `rows` are not used.
+    /// The motion of `rows`, with at least one torque per joint from `torques`; the torques in `rows` are not used.
     pub(super) fn new<'t>(
         robot: &ParametricModel,
         rows: &MotionRows,
@@ -53,16 +53,17 @@ impl SharedMotion {
     }
 }
 
-/// The rows of a hypothesis joint by joint. Residuals are root mean squares, Nm (N), at least 1 % of the torque.
+/// Fits to the rows of a hypothesis joint by joint. Residuals are root mean squares, Nm (N), at least 1 % of the
+/// torque.
 pub(super) struct JointFits<'a> {
     robot: &'a ParametricModel,
     rows: &'a MotionRows,
     panels: Arc<Panels>,
-    /// The rows over the base parameters.
+    /// The rows, with the base parameters as unknowns.
     pub(super) problem: LinearProblem,
-    /// Of the torque itself.
+    /// Root mean square torque of each joint.
     pub(super) torque: Vec<f64>,
-    /// Residual of separate parameters of each joint: a lower bound for any robot.
+    /// Residual with separate parameters of each joint: a lower bound for any robot.
     pub(super) alone: Vec<f64>,
 }
 
@@ -80,7 +81,7 @@ impl<'a> JointFits<'a> {
         Self::of_factors(robot, rows, Arc::new(panels), factors)
     }
 
-    /// The fits with a shared motion, where joint `j` has the torque number `chosen[j].0` of `motion` times
+    /// Fits with a shared motion. Joint `j` gets the torque with the index `chosen[j].0` in `motion`, times
     /// `chosen[j].1`.
     pub(super) fn of_shared(
         robot: &'a ParametricModel,
@@ -117,16 +118,16 @@ impl<'a> JointFits<'a> {
         Ok(Self { robot, rows, panels, problem, torque, alone })
     }
 
-    /// Base parameters by weighted least squares, with the inverse residual variance of each joint as weight, and their
-    /// residuals. It is faster than [`weighted_least_squares`](dynident_estimation::weighted_least_squares), since it
+    /// Base parameters by weighted least squares, with the inverse residual variance of each joint as weight, and the
+    /// residuals. It is faster than [`weighted_least_squares`](dynident_estimation::weighted_least_squares), because it
     /// computes neither covariance nor rank.
     pub(super) fn one_set(&self) -> Result<(Vec<f64>, Vec<f64>), EstimationError> {
         let problem = &self.problem;
         let mut sigma = self.torque.clone();
         let count = problem.columns().len();
         let mut theta = DVector::zeros(count);
-        // New weights only scale the normal equations of a joint, while triangles would have to be merged again. The
-        // ridge is far above the rounding of the normal equations.
+        // New weights only scale the normal equations of a joint, whereas triangular factors would have to be merged
+        // again. The regularisation is far above the rounding errors of normal equations.
         let squares: Vec<_> = problem.equations().iter().map(squares).collect();
         for _ in 0..WEIGHTING_ROUNDS {
             // The Cholesky factorisation reads only the lower triangle.
@@ -162,18 +163,19 @@ impl<'a> JointFits<'a> {
         Ok((theta.as_slice().to_vec(), sigma))
     }
 
-    /// `Σ_j ln(unexplained share of joint j)` for that set.
+    /// Sum `Σ_j ln(unexplained share of joint j)` for one set of base parameters.
     pub(super) fn free_score(&self) -> Result<f64, EstimationError> {
         let (_, free) = self.one_set()?;
         Ok(score(&free, &self.torque))
     }
 
-    /// Residual of each joint for base parameters `theta`.
+    /// Residual of each joint with the base parameters `theta`.
     pub(super) fn left_by(&self, theta: &[f64]) -> Result<Vec<f64>, EstimationError> {
         residuals(&self.problem, theta, &self.torque)
     }
 
-    /// Residual of the nominal bodies with friction fitted joint by joint; empty if a body is unknown.
+    /// Residual of each joint with the nominal bodies and friction that is fitted joint by joint; empty if a body is
+    /// unknown.
     pub(super) fn left_by_nominal(&self) -> Vec<f64> {
         let Some(nominal) = torque_of_bodies(self.robot, &self.panels) else { return Vec::new() };
         let left = left_by_nominal(self.robot, self.rows, &nominal);
@@ -181,7 +183,7 @@ impl<'a> JointFits<'a> {
     }
 }
 
-/// The regressor of some rows, without torques.
+/// Regressor of some rows, without torques.
 pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
     let (model, layout) = (robot.model(), robot.layout());
     let (q, dq, ddq) = (rows.q.concat(), rows.dq.concat(), rows.ddq.concat());
@@ -191,12 +193,12 @@ pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
     panels
 }
 
-/// `Σ_j ln(residual of joint j / torque of joint j)` without joints that have no torque.
+/// Sum `Σ_j ln(residual of joint j / torque of joint j)`, without joints that have no torque.
 pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
     left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
-/// The columns of `WᵀW` from the diagonal down, and `Wᵀτ`, of one joint.
+/// `WᵀW` (each column from the diagonal down) and `Wᵀτ` of one joint, with regressor W and torque τ.
 fn squares(equation: &JointRows) -> (Vec<Vec<f64>>, DVector<f64>) {
     let total = equation.factor.total();
     let triangle = total.regressor_triangle();
@@ -213,7 +215,7 @@ fn squares(equation: &JointRows) -> (Vec<Vec<f64>>, DVector<f64>) {
     (gram, triangle.tr_mul(&total.rotated_torque()))
 }
 
-/// Root mean square of `τ - W θ` of each joint, at least [`MIN_RESIDUAL_SHARE`] of `torque` if that is not empty.
+/// Root mean square of `τ - W θ` of each joint. If `torque` is not empty, at least [`MIN_RESIDUAL_SHARE`] of it.
 fn residuals(problem: &LinearProblem, theta: &[f64], torque: &[f64]) -> Result<Vec<f64>, EstimationError> {
     let one = |equation: &JointRows| {
         let own: Vec<f64> = equation.columns.iter().map(|&column| theta[column]).collect();

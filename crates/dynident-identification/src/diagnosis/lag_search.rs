@@ -1,5 +1,5 @@
-//! Channels that were logged too late or too early: two recorders that were started by hand, a buffer, a network. Such
-//! shifts of tenths of seconds exceed the lag that a fit compensates.
+//! Search for channels that were logged too late or too early: two recorders that were started by hand, a buffer, a
+//! network. Such shifts of tenths of a second exceed the lag that a fit compensates.
 
 use super::channels::Channels;
 use super::explanation::Explanation;
@@ -14,20 +14,20 @@ use crate::lag::LONGEST_DELAY_S;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
-/// Number of instants for the comparison of shifts.
+/// Number of instants at which shifts are compared.
 const INSTANTS: usize = 200;
 
 pub(super) struct LateChannel {
     pub(super) explained: Explained,
-    /// Improvement of the score over the channel as logged, on the same instants.
+    /// Improvement of the score by the shift, on the same instants.
     pub(super) gain: f64,
 }
 
-/// Tries shifts of torque or motion in some recordings.
+/// Tries time shifts of torque or motion in some recordings.
 pub(super) struct LagSearch<'a> {
     samples: &'a [MotionSamples],
     settings: &'a DiagnosisSettings,
-    /// Compensated lag of each joint, s.
+    /// Lag of each joint's torque that is already compensated, s.
     compensated_s: Vec<f64>,
     /// Longest shift, s.
     reach_s: f64,
@@ -57,20 +57,20 @@ impl<'a> LagSearch<'a> {
         (reach_s > step_s).then_some(lag_search)
     }
 
-    /// Tried lags in addition to the compensated ones, s.
+    /// Shifts to try, in addition to the compensated lags, s.
     pub(super) fn lags_s(&self) -> impl Iterator<Item = f64> {
         let most = (self.reach_s / self.step_s) as i32;
         let step_s = self.step_s;
         (-most..=most).filter(|k| *k != 0).map(move |k| f64::from(k) * step_s)
     }
 
-    /// The lag near `lag_s` with the smallest `value`, s.
+    /// The shift near `lag_s` with the smallest `value`, s.
     pub(super) fn refined_lag_s(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
         ternary_search([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
             .clamp(-self.reach_s, self.reach_s)
     }
 
-    /// At most `most` instants with the torque, or the motion, of `joints` taken `lag_s` later.
+    /// At most `most` instants, for which the torque or the motion of `joints` is taken `lag_s` seconds later.
     pub(super) fn rows(&self, joints: &[usize], channels: Channels, lag_s: f64, most: usize) -> MotionRows {
         let dof = self.compensated_s.len();
         let lags: Vec<f64> = (0..dof).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
@@ -82,23 +82,23 @@ impl<'a> LagSearch<'a> {
         rows
     }
 
-    /// The mistake of a lag in addition to the compensated one; `None` if a fit compensates the whole lag.
+    /// The mistake "lag" for a shift in addition to the compensated lag; `None` if a fit can compensate the total lag.
     pub(super) fn mistake(&self, joints: &[usize], channels: Channels, lag_s: f64) -> Option<Mistake> {
         let compensated_s = match channels {
             Channels::Torque => joints.iter().map(|&joint| self.compensated_s[joint]).sum::<f64>(),
             Channels::Position | Channels::Both => 0.0,
         };
         let whole_s = compensated_s / joints.len().max(1) as f64 + lag_s;
-        // A fit compensates no lag of positions.
+        // A fit does not compensate lags of positions.
         let is_long = channels == Channels::Position
             || whole_s.abs() > self.max_compensated_s
             || lag_s.abs() > self.max_compensated_s;
         is_long.then(|| Lag { joints: joints.to_vec(), channels, lag_s: whole_s }.into())
     }
 
-    /// The hypothesis with a lag of all torques, or, if a torque is inconsistent with the others, of torque or position
-    /// of one joint; `None` unless it is clearly better than the study `as_written`. It has no mistake if a fit
-    /// compensates the lag.
+    /// The best hypothesis with a lag of all torques. If one torque is inconsistent with the others, a lag of the
+    /// torque or the position of this joint is tried instead. `None` unless the hypothesis is clearly better than the
+    /// study `as_written`. The hypothesis contains no mistake if a fit compensates the lag.
     pub(super) fn late_channel(
         &self,
         robot: &ParametricModel,
@@ -137,8 +137,8 @@ impl<'a> LagSearch<'a> {
         is_better.then_some(LateChannel { explained: late, gain })
     }
 
-    /// The channels and the lag of the best fit without physical limits; `None` unless its score is clearly better than
-    /// `unshifted`.
+    /// The channels and the lag with the best fit without physical constraints; `None` unless its score is clearly
+    /// better than `unshifted`.
     fn best_lag<'g>(
         &self,
         robot: &ParametricModel,

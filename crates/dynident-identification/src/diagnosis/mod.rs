@@ -1,9 +1,10 @@
 //! Tests for mistakes in study, robot description and logs.
 //!
-//! A fit of base parameters explains many wrong studies: its parameters compensate signs, orders and units. The
-//! diagnosis therefore corrects one possible mistake after the other in the same samples. It scores each of these
-//! hypotheses by the best physically consistent fit (positive masses, dissipative friction), by joint limits, and by
-//! the distance of the bodies from the description. The study is doubted only if another hypothesis is clearly better.
+//! A fit of base parameters can explain the logs even if the study is wrong, because the parameters compensate for
+//! wrong signs, orders and units. Therefore the diagnosis corrects possible mistakes in the samples, one at a time. It
+//! scores each of these hypotheses by the best physically consistent fit (positive masses, dissipative friction), by
+//! joint limits, and by the distance of the bodies from the robot description. It reports a mistake only if another
+//! hypothesis is clearly better than the study as written.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -85,42 +86,42 @@ use training::{SearchedLogs, searched_logs};
 pub struct Diagnosis {
     /// The compared hypotheses.
     pub search: Search,
-    /// The nominal bodies compared with the torque of the best hypothesis; `None` if a body is unknown.
+    /// The nominal bodies, compared with the torque of the best hypothesis; `None` if a body is unknown.
     pub description_fit: Option<DescriptionFit>,
-    /// Payloads in held-out logs and not in training logs, or the reverse.
+    /// Payloads that are in held-out logs but not in training logs, or in training logs but not in held-out logs.
     pub unmodelled_payloads: Vec<UnmodelledPayload>,
     /// Mistakes of single held-out logs.
     pub held_out: Vec<HeldOutHypothesis>,
-    /// Columns that are used for two joints; then no hypothesis is reliable.
+    /// Columns that are used for two joints. If there are any, no hypothesis is reliable.
     pub duplicate_channels: Vec<DuplicateChannel>,
     /// Whether the torques are magnitudes without signs.
     pub lost_signs: bool,
-    /// Torques that are inconsistent with the others under the best hypothesis.
+    /// Joint torques that no robot model explains together with the other torques, for the best hypothesis.
     pub inconsistent_torques: Vec<InconsistentTorque>,
-    /// Share of each joint's torque that noise explains, 0 to 1 (root mean squares): white noise of the torque and,
-    /// where the best hypothesis leaves most of the torque unexplained, noise of the positions.
+    /// Share of each joint's torque that noise explains, 0 to 1 (root mean squares). Included are white noise of the
+    /// torque and, if the best hypothesis leaves most of the torque unexplained, noise of the positions.
     pub noise: Vec<f64>,
-    /// The same for the torque of all joints together.
+    /// Share of the torque of all joints together that noise explains, 0 to 1 (root mean squares).
     pub noise_of_all: f64,
 }
 
 impl Diagnosis {
-    /// Whether even the best hypothesis has a far larger residual than separate parameters of each joint: the
+    /// Whether even the best hypothesis has a far larger residual than separate parameters of each joint. Then the
     /// description is of another robot, or the study has several mistakes.
     pub fn is_unexplained(&self) -> bool {
         self.search.believed().is_unexplained()
     }
 
-    /// Share of all torque that neither the best hypothesis nor noise explains, 0 to 1.
+    /// Share of the torque of all joints that neither the best hypothesis nor noise explains, 0 to 1.
     pub fn unexplained_beyond_noise(&self) -> f64 {
         let left = self.search.believed().left_of_all.min(1.0);
         (left.powi(2) - self.noise_of_all.powi(2)).max(0.0).sqrt()
     }
 }
 
-/// Searches the mistake that explains the recordings best, and causes in held-out recordings. If no hypothesis explains
-/// the torque, and the cut-off was chosen from the data, lower cut-offs are tried: noise of the positions, which grows
-/// with frequency, may hide the mistake.
+/// Searches for the mistake that explains the training recordings best, and for payloads and mistakes of single
+/// held-out recordings. If no hypothesis explains the torque, and the cut-off was chosen from the data, lower cut-offs
+/// are tried: noise of the positions, which grows with frequency, may hide the mistake.
 ///
 /// # Errors
 /// Unreadable recordings, too few rows, invalid limits in the settings.
@@ -148,13 +149,13 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     Ok(found)
 }
 
-/// [`diagnose`] at one cut-off.
+/// Diagnosis with one cut-off; see [`diagnose`].
 fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     let SearchedLogs { search, study, consistency, compensated_s, torque_noise } = searched_logs(task)?;
     let DiagnosisTask { logs, training, theta, settings, .. } = task;
     let settings = &settings.diagnosis_limits;
     let (robot, model) = (&study.robot, RegressorModel::from(study.robot.clone()));
-    // Units of torque are compared with the best hypothesis, payloads only without a mistake.
+    // Units of torque are compared with the best hypothesis. Payloads are searched only if there is no mistake.
     let best = search.corrected(&study);
     let description_fit = description_fit(&best.robot, &best.rows, &search.believed().left, settings.description);
     let as_written = &search.as_written;
@@ -173,7 +174,7 @@ fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisErr
     };
     let duplicate_channels = duplicate_channels(&study.rows, &as_written.left, &settings.channels);
     let lost_signs = has_lost_signs(&study.rows, as_written.left_of_all, &settings.channels);
-    // The noise of corrected columns is unknown.
+    // The noise of columns that were corrected is unknown.
     let noise = |explained: &Explanation| {
         if search.best.is_some() {
             return Ok(vec![0.0; robot.dof()]);

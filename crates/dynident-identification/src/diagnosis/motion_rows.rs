@@ -5,30 +5,31 @@ use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, motion_band_hz};
 
-/// Number of instants; more do not improve the accuracy.
+/// Number of instants; more instants do not improve the accuracy.
 pub(super) const INSTANTS: usize = 300;
 
-/// Velocity of a joint at rest relative to its root mean square velocity. The friction of a joint at rest can have any
-/// value up to that in motion, so its torque does not test a robot.
+/// Velocity below which a joint is at rest, relative to its root mean square velocity. The friction of a joint at rest
+/// can have any value up to the friction in motion, so its torque does not test a robot model.
 const REST_SHARE: f64 = 0.02;
-/// Least number of instants without a joint at rest for which the others are left out.
+/// Instants with a joint at rest are excluded only if at least this number of instants remains.
 const MIN_MOVING: usize = 100;
-/// Least share of instants with a joint at rest for which they are left out. The reversals of seven joints that move
-/// all the time are about a tenth.
+/// Instants with a joint at rest are excluded only if their share is at least this large. In a continuous motion of
+/// seven joints, the reversals alone are about a tenth of the instants.
 const MIN_RESTING_SHARE: f64 = 0.15;
 
-/// Standard deviation of a normal distribution over the median of its magnitude.
+/// Ratio of the standard deviation of a normal distribution to the median of its magnitude.
 const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
 /// Variance of the third difference of white noise of variance 1.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
 
-/// Number of instants to take from log number `log` (from 0) of `logs`, so that all logs together give at most `total`:
-/// the same number from each log. With more logs than `total`, one from each of `total` evenly chosen logs.
+/// Number of instants to take from log number `log` (from 0) of `logs`, so that all logs together give at most `total`
+/// instants. Each log gives the same number. If there are more logs than `total`, one instant is taken from each of
+/// `total` evenly spaced logs.
 pub(super) fn instants_of_log(total: usize, log: usize, logs: usize) -> usize {
     if logs <= total { total / logs.max(1) } else { (log + 1) * total / logs - log * total / logs }
 }
 
-/// Instants of a motion with its torques, in SI units and in the model's order of joints.
+/// Instants of a motion with its torques, in SI units, joints in the order of the model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionRows {
     /// Positions (rad, m), one vector for each joint.
@@ -41,30 +42,30 @@ pub struct MotionRows {
     pub tau: Vec<Vec<f64>>,
     /// Rate of the recording, Hz.
     pub rate_hz: f64,
-    /// Number of independent instants, whose distance is that of the rows of a fit.
+    /// Number of independent instants: as many as the rows that a fit to this motion uses.
     pub independent: f64,
 }
 
-/// Motion and torque of a recording with the same filter, decimated. Instants are taken from these samples, each with
-/// its own torque or with a shifted torque.
+/// Motion and torque of a recording after the same filter, decimated. Instants are selected from these samples, each
+/// with the torque at the same time or with a torque shifted in time.
 #[derive(Clone, Debug)]
 pub(super) struct MotionSamples {
     rows: MotionRows,
-    /// The first row of each uninterrupted piece.
+    /// Index of the first row of each uninterrupted piece.
     pieces: Vec<usize>,
     /// Time between rows, s.
     spacing_s: f64,
-    /// Number of rows for each row of a fit.
+    /// Number of these rows per row of a fit.
     rows_of_fit: f64,
-    /// Largest interpolated share of a joint's torque, for each row; empty if no sample was rejected.
+    /// For each row, the largest interpolated share of a joint's torque; empty if no sample was rejected.
     interpolated: Vec<f64>,
     max_interpolated: f64,
-    /// Rows in which a joint rests that moves in other rows; empty if too few rows would remain.
+    /// For each row, whether a joint rests that moves in other rows; empty if too few rows would remain.
     resting: Vec<bool>,
 }
 
 impl MotionSamples {
-    /// Reads recording number `index`, or the excerpt of a long recording. `max_interpolated` is
+    /// Reads the recording with this index, or the excerpt of a long recording. `max_interpolated` is
     /// [`MotionLimits::max_interpolated`](super::MotionLimits::max_interpolated).
     pub(super) fn of_recording(
         logs: &Logs<'_>,
@@ -104,7 +105,7 @@ impl MotionSamples {
                     decimator.finish();
                 }
             }
-            // Rows that depend on extrapolated samples are left out.
+            // Rows that depend on extrapolated samples are excluded.
             let [begin, behind] = block.unsettled;
             let settled = begin..block.rows.saturating_sub(behind).max(begin);
             fill_panel(block, &places, &settled, &mut panel);
@@ -130,7 +131,7 @@ impl MotionSamples {
         Ok(Self { rows, pieces, spacing_s, rows_of_fit, interpolated, max_interpolated, resting })
     }
 
-    /// At most `most` of its instants, evenly chosen.
+    /// At most `most` of the instants, evenly spaced.
     pub(super) fn instants(&self, most: usize) -> MotionRows {
         let all: Vec<usize> = (0..self.rows.len()).filter(|&row| self.is_usable(row)).collect();
         let count = all.len();
@@ -139,7 +140,8 @@ impl MotionSamples {
     }
 
     /// Standard deviation of the white noise of a joint's torque in these samples, Nm (N), from third differences:
-    /// `σ = 1.4826 median |Δ³τ| / √20`. A smooth torque has none, and the median ignores steps.
+    /// `σ = 1.4826 median |Δ³τ| / √20`. The third differences of a smooth torque are nearly zero, and the median
+    /// ignores jumps.
     pub(super) fn torque_noise(&self, joint: usize) -> f64 {
         let difference = |tau: &[f64]| (tau[3] - 3.0 * tau[2] + 3.0 * tau[1] - tau[0]).abs();
         let mut differences: Vec<f64> = self.rows.tau[joint].windows(4).map(difference).collect();
@@ -153,9 +155,9 @@ impl MotionSamples {
         self.each_piece().map(|piece| piece.len()).max().unwrap_or(0) as f64 * self.spacing_s
     }
 
-    /// At most `most` instants that have samples up to `reach_s` before and after them, each with the torque (or the
-    /// motion, by `channels`) `lag_s` later, one lag for each joint, interpolated linearly. All lags have the same
-    /// instants.
+    /// At most `most` instants with a lag for each joint: the torque (or the motion, as `channels` states) is taken
+    /// `lag_s` seconds later, interpolated linearly. Only instants with samples up to `reach_s` before and after them
+    /// are used, so that all lags have the same instants.
     pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
         let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
@@ -183,7 +185,7 @@ impl MotionSamples {
         rows
     }
 
-    /// The instants with the numbers `chosen`; `all` is the number of usable instants.
+    /// The instants with the indices `chosen`; `all` is the number of usable instants.
     fn selected(&self, chosen: &[usize], all: usize) -> MotionRows {
         let independent = (all as f64 / self.rows_of_fit).min(chosen.len() as f64);
         let MotionRows { q, dq, ddq, tau, rate_hz, .. } = &self.rows;
@@ -202,8 +204,8 @@ impl MotionSamples {
     }
 }
 
-/// Rows in which a joint rests that moves in other rows; empty for motion without pauses ([`MIN_RESTING_SHARE`]), and
-/// if less than [`MIN_MOVING`] others would remain.
+/// For each row, whether a joint rests that moves in other rows. Empty for a motion without pauses
+/// ([`MIN_RESTING_SHARE`]), and if fewer than [`MIN_MOVING`] other rows would remain.
 fn resting(rows: &MotionRows) -> Vec<bool> {
     let mut resting = vec![false; rows.len()];
     for dq in &rows.dq {
@@ -217,15 +219,16 @@ fn resting(rows: &MotionRows) -> Vec<bool> {
     if moving < MIN_MOVING || is_continuous { Vec::new() } else { resting }
 }
 
-/// The parallel filter of instants, with four times the rows of a fit, since short logs would have too few.
+/// Parallel filter for instants. It gives four times as many rows as the filter of a fit, because short logs would
+/// otherwise have too few.
 pub(super) fn instant_filter(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
     let of_fit = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
     let factor = of_fit.map_or(1, |settings| settings.factor / 4).max(1);
     ParallelFilterSettings { factor: Some(factor), ..logs.filter.clone() }
 }
 
-/// Writes position, velocity, acceleration, torque and marks, one column for each joint. Rejected samples of the torque
-/// are interpolated linearly and have the mark 1.
+/// Writes positions, velocities, accelerations, torques and marks, one column for each joint. Rejected samples of the
+/// torque are interpolated linearly and have the mark 1.
 fn fill_panel(block: &MotionBlock, places: &[usize], settled: &Range<usize>, panel: &mut Vec<f64>) {
     panel.clear();
     for values in [&block.q, &block.dq, &block.ddq] {
@@ -266,13 +269,13 @@ fn interpolated_torque(tau: &[f64], marked: &[bool]) -> Vec<f64> {
 }
 
 impl MotionRows {
-    /// Empty rows of `joints` joints.
+    /// Storage for `joints` joints without any instant.
     pub fn empty(joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
         Self { q: none(), dq: none(), ddq: none(), tau: none(), rate_hz: 0.0, independent: 0.0 }
     }
 
-    /// Position, velocity and acceleration of all joints at instant number `row`.
+    /// Positions, velocities and accelerations of all joints at the instant with index `row`.
     pub(super) fn at(&self, row: usize) -> [Vec<f64>; 3] {
         [&self.q, &self.dq, &self.ddq].map(|values| values.iter().map(|values| values[row]).collect())
     }
@@ -282,7 +285,7 @@ impl MotionRows {
         self.q.first().map_or(0, Vec::len)
     }
 
-    /// Whether there is no instant.
+    /// Whether there are no instants.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -299,7 +302,7 @@ impl MotionRows {
         }
     }
 
-    /// The columns of these channels; position includes velocity and acceleration.
+    /// The values of these channels; the position channel includes velocity and acceleration.
     pub(super) fn of_mut(&mut self, channels: Channels) -> impl Iterator<Item = &mut Vec<Vec<f64>>> {
         let is_of = move |k: usize| channels == Channels::Both || (k == 3) == (channels == Channels::Torque);
         self.quantities_mut().into_iter().enumerate().filter(move |(k, _)| is_of(*k)).map(|(_, columns)| columns)

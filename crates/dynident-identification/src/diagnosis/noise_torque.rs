@@ -1,10 +1,10 @@
-//! Torque from noise of the positions.
+//! Torque that results from noise of the positions.
 
 use super::motion_rows::instant_filter;
 use dynident_rows::{LogError, LogPass, Logs, RegressorModel, noise_factors};
 
-/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to the prediction
-/// of each joint by base parameters `theta` at the compared instants, Nm (N): `N θ` of [`noise_factors`]. Zero if the
+/// Root mean square torque of each joint, Nm (N), that position noise adds to the prediction by base parameters `theta`
+/// at the compared instants, over the recordings `training`: `N θ` with the rows N of [`noise_factors`]. Zero if the
 /// noise is unknown.
 pub(super) fn torque_of_noise(
     logs: &Logs<'_>,
@@ -18,7 +18,7 @@ pub(super) fn torque_of_noise(
         let Some(report) = pass.each_block(&mut |_| Ok(()))? else { continue };
         let filter = instant_filter(logs, report.rate_hz);
         let pass = LogPass { filter: &filter, ..pass };
-        // Weighted to be one row.
+        // Weighted so that the noise rows represent one row.
         let Some(factors) = noise_factors(&pass, model, Some(&report), 1)? else { continue };
         for (joint, (square, factor)) in squares.iter_mut().zip(&factors).enumerate() {
             let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| theta[column]).collect();

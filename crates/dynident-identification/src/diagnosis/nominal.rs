@@ -8,13 +8,14 @@ use dynident_model::terms::CoulombShape;
 use dynident_rows::predicted_torque;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
+/// Torque of the nominal bodies, one vector for each joint, Nm (N); `None` if inertial parameters of a body are
+/// unknown.
 pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
     Some(torque_of(robot, rows, |[q, dq, ddq]| [q, dq, ddq]))
 }
 
-/// The same from the regressor of the rows.
+/// Torque of the nominal bodies, computed from the regressor of the rows.
 pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
     let mut parameters = robot.model().parameter_vector();
@@ -30,7 +31,8 @@ pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Opti
     Some((0..robot.dof()).map(of_joint).collect())
 }
 
-/// Gravity torque of the nominal bodies, one vector for each joint, Nm (N); zeros while a body's inertials are unknown.
+/// Gravity torque of the nominal bodies, one vector for each joint, Nm (N); zero if inertial parameters of a body are
+/// unknown.
 pub(super) fn gravity_torque(robot: &ParametricModel, rows: &MotionRows) -> Vec<Vec<f64>> {
     if robot.nominal_base().is_none() {
         return vec![vec![0.0; rows.len()]; robot.dof()];
@@ -54,8 +56,8 @@ fn torque_of(
     torque
 }
 
-/// Residual of each joint by the torque `nominal` of the nominal bodies ([`nominal_torque`]) with the best nonnegative
-/// viscous and Coulomb friction and the best offset, root mean square, Nm (N).
+/// Root mean square residual of each joint, Nm (N), with the torque `nominal` of the nominal bodies
+/// ([`nominal_torque`]), the best nonnegative viscous and Coulomb friction, and the best offset.
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
@@ -64,7 +66,7 @@ pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nomina
     nominal.iter().enumerate().map(left).collect()
 }
 
-/// Residual of `tau` by an offset and nonnegative friction, root mean square.
+/// Root mean square residual of `tau` after a fit of offset and nonnegative friction.
 fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
     let count = tau.len();
     let columns = [vec![1.0; count], dq.to_vec(), dq.iter().map(|&dq| step.step(dq)).collect()];

@@ -1,4 +1,5 @@
-//! Implausible motion: positions beyond stops, velocities beyond limits, a rate that no recorder has.
+//! Tests for implausible motion: positions beyond the joint limits, velocities beyond the limits, a rate that no
+//! recorder has.
 
 use super::motion_rows::MotionRows;
 use crate::diagnosis_settings::MotionLimits;
@@ -7,16 +8,16 @@ use dynident_recording::ImportReport;
 use dynident_recording::log::Quantity;
 use dynident_recording::report::ChannelReport;
 
-/// A joint beyond a limit.
+/// A joint that exceeds a limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeyondLimit {
-    /// The joint's number.
+    /// Index of the joint.
     pub joint: usize,
     /// `position` or `velocity`.
     pub quantity: &'static str,
-    /// The value with the largest excess (SI).
+    /// The value that exceeds the limit most (SI units).
     pub value: f64,
-    /// The limit (SI).
+    /// The limit (SI units).
     pub limit: f64,
 }
 
@@ -44,7 +45,7 @@ pub(super) fn beyond_limits(model: &Model, rows: &MotionRows, settings: &MotionL
     found
 }
 
-/// Whether the channels of an import report show a position beyond its stop, or a rate that no recorder has.
+/// Whether an import report shows a position beyond its limit, or a rate that no recorder has.
 pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport, settings: &MotionLimits) -> bool {
     let is_behind = |channel: &ChannelReport| {
         let limits = model.joint_index(&channel.joint).map(|joint| model.joints()[joint].limits);
@@ -59,7 +60,7 @@ pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport, settings: &
     !is_rate_of_a_recorder(model, report.rate_hz, settings) || report.channels.iter().any(is_behind)
 }
 
-/// Whether a log has jumps that are not motion, so that hypotheses are not comparable. Rejected single samples are
+/// Whether a log has jumps that are not motion, so that hypotheses cannot be compared. Single rejected samples are
 /// harmless.
 pub(crate) fn has_jumps(report: &ImportReport) -> bool {
     let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
@@ -68,7 +69,7 @@ pub(crate) fn has_jumps(report: &ImportReport) -> bool {
     })
 }
 
-/// Whether a recorder of such a robot has this rate.
+/// Whether recorders of robots of this size can have this rate.
 pub(super) fn is_rate_of_a_recorder(model: &Model, rate_hz: f64, settings: &MotionLimits) -> bool {
     let [lowest, highest] = settings.recorder_rates_hz.map(|usual_hz| model.characteristic_scale().hertz(usual_hz));
     (lowest..=highest).contains(&rate_hz)

@@ -1,4 +1,4 @@
-//! The best number of a mistake, and the range of numbers that the logs do not distinguish from it.
+//! Search for the best number of a mistake, and for the range of numbers that the logs do not distinguish from it.
 
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::mistakes::Mistake;
@@ -6,29 +6,32 @@ use super::step_width::with_widths;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 
-/// Number of position units that get a consistent fit, those with the smallest free residuals.
+/// Number of position units for which a physically consistent fit is computed: those with the smallest residuals of the
+/// unconstrained fit.
 const MAX_FITTED_UNITS: usize = 4;
-/// Step of the search for the range of a factor, and accuracy of its ends, of the factor's logarithm.
+/// Step of the search for the range of a factor, as the logarithm of the factor.
 const RANGE_STEP: f64 = 0.2;
+/// Accuracy of the ends of that range, as the logarithm of the factor.
 const RANGE_ACCURACY: f64 = 0.03;
 
-/// The hypothesis with a better number of its last mistake; `None` if its number is the best. `at` is the study before
-/// this mistake.
+/// The hypothesis with a better number of its last mistake; `None` if its number is already the best. `at` is the study
+/// before this mistake is corrected.
 pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &ConsistencySettings) -> Option<Explained> {
     let last = first.hypothesis.mistakes.last()?;
-    // A smaller unit of positions makes a wide friction step narrow: each unit gets its own steps.
+    // With positions in a smaller unit, a wide smoothed friction sign becomes narrow. Therefore its width is fitted for
+    // each unit.
     let facts = last.facts();
     if facts.position_factor.is_some() {
         return refined_with_own_steps(at, last, consistency);
     }
-    // The fit without physical limits is smooth and cheap. Errors of the nominal masses would bias a torque gain.
+    // The fit without physical constraints is smooth and cheap. Errors of the nominal masses would bias a torque gain.
     let value = |hypothesis: &Hypothesis| match facts.torque_gain {
         Some(_) => hypothesis.free_score(),
         None => hypothesis.lower_bound(),
     };
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
     let found = at.without(&last.with_best_number(free)?).explained(consistency).ok()?;
-    // Free numbers fit the noise: a round number is kept unless the free one is clearly better.
+    // A free number partly fits the noise. Therefore a round number is kept unless the free number is clearly better.
     let is_better = if facts.number.is_none_or(|number| number.is_round) {
         found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
     } else {
@@ -37,8 +40,9 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
     is_better.then_some(found)
 }
 
-/// The hypothesis with the best unit of positions, where each unit has the friction steps that fit its own rows. Gear
-/// ratios and encoder counts are not round; a round unit is kept unless another is clearly better.
+/// The hypothesis with the best unit of positions. For each unit, the widths of the smoothed friction signs are fitted
+/// to the rows. Gear ratios and encoder counts are not round numbers; a round unit is kept unless another factor is
+/// clearly better.
 fn refined_with_own_steps(
     at: &CorrectedStudy,
     first: &Mistake,
@@ -49,7 +53,8 @@ fn refined_with_own_steps(
     let as_tried = explained(first)?;
     let number = first.facts().number?;
     let bound = |mistake: &Mistake| free_bound(at, &as_tried.study.robot, first, mistake);
-    // Inconsistent bodies also fit positions in a unit that is too small, so the consistent fit selects the minimum.
+    // Physically inconsistent bodies can also explain positions in a unit that is too small. Therefore the physically
+    // consistent fit selects among the minima.
     let found: Vec<Mistake> = if number.is_round {
         first.with_best_number(bound).into_iter().collect()
     } else {
@@ -62,15 +67,16 @@ fn refined_with_own_steps(
     let limit = as_tried.hypothesis.score() - needed;
     let mut best = best.filter(|best| best.hypothesis.score() < limit).unwrap_or(as_tried);
     let last = best.hypothesis.mistakes.last()?;
-    // Other friction, or usual errors of the description, move the best factor by more than `min_gain` does.
+    // Unmodelled friction, or usual errors of the description, move the best factor by more than noise would. Therefore
+    // twice `min_gain` is used.
     let max_increase = 2.0 * at.settings.score.min_gain;
     let value = |mistake: &Mistake| free_bound(at, &best.study.robot, last, mistake);
     best.hypothesis.factors_alike = factor_range(last, max_increase, value);
     Some(best)
 }
 
-/// Lower bound of the score with positions in another unit. The friction steps are those of `robot` in the unit of
-/// `of`, at the same velocities of the log.
+/// Lower bound of the score with positions in another unit. The widths of the friction signs are those of `robot` in
+/// the unit of `of`, converted to the same velocities in the log.
 fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistake: &Mistake) -> f64 {
     let (facts, dof) = (mistake.facts(), robot.dof());
     let (Some(from), Some(factor)) = (of.facts().position_factor, facts.position_factor) else { return f64::INFINITY };
@@ -81,8 +87,7 @@ fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistak
     found.map_or(f64::INFINITY, |found| found.lower_bound())
 }
 
-/// Smallest and largest position factor around that of `mistake` with a `value` that increases by at most
-/// `max_increase`.
+/// Smallest and largest position factor around that of `mistake` for which `value` increases by at most `max_increase`.
 fn factor_range(mistake: &Mistake, max_increase: f64, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
     let facts = mistake.facts();
     let (factor, reach) = (facts.position_factor?, facts.number?.reach);

@@ -1,4 +1,4 @@
-//! One round of the search: bounds, fits and acceptance of all candidates that correct one more mistake.
+//! One round of the search for mistakes: bounds, fits and acceptance of all candidates that correct one more mistake.
 
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::joint_fits::SharedMotion;
@@ -6,7 +6,8 @@ use super::mistakes::{Breadth, Mistake, Proof, Setup};
 use crate::consistent::ConsistencySettings;
 use rayon::prelude::*;
 
-/// Number of candidates fitted in parallel; fixed, so that the result does not depend on the number of threads.
+/// Number of candidates that are fitted in parallel. It is fixed, so that the result does not depend on the number of
+/// threads.
 const BATCH: usize = 4;
 
 #[derive(Clone)]
@@ -18,15 +19,15 @@ struct Bounded {
 #[derive(Clone, Default)]
 pub(super) struct Round {
     pub(super) tried: usize,
-    /// Candidates whose lower bound is good enough.
+    /// Candidates whose lower bound of the score is good enough.
     bounded: Vec<Bounded>,
-    /// Consistent fits of these candidates, and of torque gains between candidates.
+    /// Physically consistent fits of these candidates, and of torque gains between two candidates.
     fitted: Vec<Explained>,
 }
 
 impl Round {
-    /// Fits candidates of `breadths` that correct one more mistake of the hypothesis `at`; `known` is the round of the
-    /// first of these breadths.
+    /// Fits all candidates from the groups `breadths` that correct one more mistake than the hypothesis `at`. `known`
+    /// is the round with only the first of these groups.
     pub(super) fn new(
         at: &Explained,
         consistency: &ConsistencySettings,
@@ -65,7 +66,7 @@ impl Round {
         Self { tried: all.len(), bounded: left, fitted }
     }
 
-    /// The accepted hypotheses, best first.
+    /// The accepted hypotheses, the best first.
     pub(super) fn winners(mut self, at: &Explained, consistency: &ConsistencySettings) -> Vec<Explained> {
         self.fitted.extend(twin_of_best(&self.fitted, &at.study, consistency));
         self.fitted.retain(|one| is_accepted(&one.hypothesis, &at.hypothesis));
@@ -75,7 +76,7 @@ impl Round {
     }
 }
 
-/// The [twin](Mistake::twin) of the best hypothesis, which has a similar score, if it was not fitted yet.
+/// The [twin](Mistake::twin) of the best hypothesis, which usually has a similar score, if it was not fitted yet.
 fn twin_of_best(fitted: &[Explained], at: &CorrectedStudy, consistency: &ConsistencySettings) -> Option<Explained> {
     let best = fitted.iter().min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()))?;
     let twin = at.without(&best.study.mistakes.last()?.twin()?);
@@ -83,8 +84,8 @@ fn twin_of_best(fitted: &[Explained], at: &CorrectedStudy, consistency: &Consist
     if is_known { None } else { twin.explained(consistency).ok() }
 }
 
-/// The best torque factor of each joint for which a factor is among the tried corrections. All joints get the best one
-/// at once: a factor that is only nearly right leaves an error at this joint, which disturbs the fit of the others.
+/// Torque factors of all joints for which a factor is among the tried corrections, each refined to its best value. (A
+/// factor that is only nearly right leaves an error at its joint, which disturbs the fit of the other joints.)
 fn gains_of_torques(at: &CorrectedStudy, motion: &SharedMotion, tried: &[Bounded]) -> Vec<Mistake> {
     let free_score = |mistake: &Mistake| at.without(mistake).free_score(motion);
     let mut nearest: Vec<Option<(f64, &Mistake)>> = vec![None; at.robot.dof()];
@@ -99,7 +100,7 @@ fn gains_of_torques(at: &CorrectedStudy, motion: &SharedMotion, tried: &[Bounded
     nearest.par_iter().filter_map(|mistake| mistake.with_best_number(free_score)).collect()
 }
 
-/// Moves the [likelier](Mistake::likelier) of two mistakes to the first place if the logs hardly distinguish them.
+/// If the logs hardly distinguish two mistakes, moves the [likelier](Mistake::likelier) one to the first place.
 fn likelier_first(fitted: &mut [Explained]) {
     let Some(first) = fitted.first() else { return };
     let limit = first.hypothesis.score() + first.study.settings.score.max_indistinguishable;
@@ -111,8 +112,8 @@ fn likelier_first(fitted: &mut [Explained]) {
     }
 }
 
-/// Whether a hypothesis has a clearly larger residual than `from` neither for a joint nor for all, and has the
-/// [proof](Proof) of its last mistake.
+/// Whether a hypothesis is accepted: its residual is not clearly larger than that of `from` for any joint or for all
+/// joints together, and it meets the [`Proof`] of its last mistake.
 fn is_accepted(hypothesis: &Hypothesis, from: &Hypothesis) -> bool {
     let limits = &hypothesis.settings.acceptance;
     let last = hypothesis.mistakes.last();
@@ -145,8 +146,8 @@ fn is_proved(proof: Proof, hypothesis: &Hypothesis, from: &Hypothesis) -> bool {
     }
 }
 
-/// Whether a joint's torque becomes consistent with the other joints, for one set of base parameters or for a
-/// consistent robot: the wrong gain of a strong joint spoils its neighbours.
+/// Whether a joint's torque becomes consistent with the other joints, either for one set of base parameters or for a
+/// physically consistent robot. (A wrong gain of a joint with large torque disturbs the fit of its neighbours.)
 fn becomes_consistent(joint: usize, hypothesis: &Hypothesis, from: &Hypothesis) -> bool {
     let limits = &hypothesis.settings.acceptance;
     let is_inconsistent = |left: f64, of: &Hypothesis| left > limits.min_inconsistent_ratio * of.alone[joint];

@@ -1,7 +1,8 @@
 //! The search for the hypothesis that explains the samples best.
 //!
-//! The fit without physical limits is ten times cheaper and gives a lower bound of the score. Only candidates whose
-//! bound is good enough get a consistent fit. Hypotheses with almost the same score as the best are reported with it.
+//! A fit without physical constraints is ten times cheaper than a physically consistent fit and gives a lower bound of
+//! the score. The consistent fit is computed only for candidates whose bound is good enough. Hypotheses with almost the
+//! same score as the best one are reported with it.
 
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
 use super::mistakes::{Breadth, Mistake};
@@ -9,36 +10,37 @@ use super::refinement::refined;
 use super::round::Round;
 use crate::consistent::ConsistencySettings;
 
-/// Number of other first mistakes that are paired with a second mistake, once the best one has a second mistake.
+/// Number of other first mistakes that are combined with a second mistake, after the best first mistake got a second
+/// one.
 const MAX_RUNNERS_UP: usize = 8;
 
 /// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The study as written.
+    /// Score and residuals of the study as written.
     pub as_written: Hypothesis,
     /// The hypothesis that explains the samples clearly better, if one was found.
     pub best: Option<Hypothesis>,
-    /// Hypotheses that the logs do not distinguish from the best.
+    /// Hypotheses that the logs do not distinguish from the best one.
     pub alike: Vec<Hypothesis>,
-    /// Number of tried candidates.
+    /// Number of candidates that were tried.
     pub tried: usize,
 }
 
 impl Search {
-    /// The better hypothesis, or the study as written.
+    /// The best hypothesis, or the study as written if no hypothesis is clearly better.
     pub fn believed(&self) -> &Hypothesis {
         self.best.as_ref().unwrap_or(&self.as_written)
     }
 
-    /// The study with the mistakes of the believed hypothesis corrected.
+    /// The study with the mistakes of [`believed`](Self::believed) corrected.
     pub(super) fn corrected(&self, study: &CorrectedStudy) -> CorrectedStudy {
         study.without_all(&self.believed().mistakes)
     }
 }
 
-/// Searches mistakes in addition to those of `start` in a study whose evidence is `as_written`: first only common ones,
-/// then common and rarer ones.
+/// Searches for mistakes in addition to those of `start`: first only common mistakes, then common and rarer ones.
+/// `as_written` is the evidence for the study as written.
 pub(super) fn searches(as_written: &Hypothesis, start: &Explained, consistency: &ConsistencySettings) -> [Search; 2] {
     let mut known = Round::default();
     [&[Breadth::Usual][..], &[Breadth::Usual, Breadth::Rare]].map(|breadths| {
@@ -48,8 +50,8 @@ pub(super) fn searches(as_written: &Hypothesis, start: &Explained, consistency: 
     })
 }
 
-/// Corrects several mistakes one after the other, starting with the round `first` of candidates after `start`; `next`
-/// tries the candidates after another hypothesis.
+/// Corrects several mistakes one after the other. `first` is the round of candidates after `start`; `next` computes the
+/// round of candidates after another hypothesis.
 fn search(
     as_written: &Hypothesis,
     start: &Explained,
@@ -68,11 +70,12 @@ fn search(
         tried += round.tried;
         let winners = round.winners(&at, consistency);
         let Some((first, rest)) = winners.split_first() else { break };
-        // A second mistake is rarer than the first.
+        // A second mistake is rarer than a single one, so it needs a larger improvement.
         if first.hypothesis.score() > at.hypothesis.score() - limits.min_gain * (corrected + number + 1) as f64 {
             break;
         }
-        // The first mistake was selected while the second was uncorrected, so the best pair is searched.
+        // The first mistake was selected before the second was corrected. Therefore other first mistakes are also
+        // tried.
         let mut first = first.clone();
         if number == 1 {
             for start in &runners_up {
@@ -89,7 +92,7 @@ fn search(
         alike = indistinguishable(&best.hypothesis, rest);
         at = best;
     }
-    // With few instants a small improvement is not significant.
+    // With few instants, a small improvement is not significant.
     let best = at.hypothesis;
     let needed = as_written.margin * limits.min_gain * best.mistakes.len() as f64;
     let is_enough = as_written.margin <= 1.0 || best.score() <= as_written.score() - needed;
@@ -97,7 +100,8 @@ fn search(
     Search { as_written: as_written.clone(), best: found.then_some(best), alike, tried }
 }
 
-/// Hypotheses with the same first mistakes as `best` that the logs do not distinguish from it.
+/// Hypotheses that the logs do not distinguish from `best`. They contain the same mistakes, except for the kind of the
+/// last one.
 fn indistinguishable(best: &Hypothesis, others: &[Explained]) -> Vec<Hypothesis> {
     let Some((last, before)) = best.mistakes.split_last() else { return Vec::new() };
     let limits = &best.settings.score;
@@ -111,7 +115,7 @@ fn indistinguishable(best: &Hypothesis, others: &[Explained]) -> Vec<Hypothesis>
     others.iter().map(|other| &other.hypothesis).filter(is_close).take(limits.max_reported).cloned().collect()
 }
 
-/// The best hypotheses in addition to `first`, one for each mistake without its number.
+/// The best hypotheses other than `first`, one for each mistake regardless of its number.
 fn different_from(first: &Explained, others: &[Explained]) -> Vec<Explained> {
     let mut kept: Vec<Explained> = Vec::new();
     for other in others {

@@ -1,15 +1,15 @@
-//! The column space of a matrix, and norms.
+//! Column space of a matrix, and norms.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest singular value of a basis, relative to the largest.
+/// Minimum singular value of a basis relative to the largest one.
 const MIN_SINGULAR_RATIO: f64 = 1.0e-9;
 
 /// An orthonormal basis of the column space of a matrix. Columns may have different units and may be dependent.
 pub(super) struct Span(DMatrix<f64>);
 
 impl Span {
-    /// `None` for an empty matrix.
+    /// Computes the basis; `None` for an empty matrix.
     pub(super) fn new(mut columns: DMatrix<f64>) -> Option<Self> {
         if columns.is_empty() {
             return None;

@@ -1,7 +1,7 @@
-//! The width of the dry friction step in some rows.
+//! Width of the smoothed sign of dry friction that fits some rows best.
 //!
-//! A motion at a lower rate has its friction steps nearer to zero velocity, so a wider step would look like another
-//! rate. The width is not a mistake of the study, since identification selects it.
+//! If the width in the model is wrong, another sample rate can seem to fit better, because it scales all velocities.
+//! The width itself is not a mistake of the study, because an identification selects it.
 
 use super::joint_fits::JointFits;
 use super::motion_rows::MotionRows;
@@ -10,13 +10,14 @@ use dynident_estimation::EstimationError;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 use rayon::prelude::*;
 
-/// Factors on the present width that are tried first, then factors on the best of these widths.
+/// Factors on the present width that are tried first.
 const WIDTH_FACTORS: [f64; 7] = [0.4, 1.6, 2.5, 4.0, 6.0, 10.0, 15.0];
+/// Finer factors, which are tried in this order on the best width so far.
 const FINE_FACTORS: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
 
-/// The robot with the widths of smooth steps at which one set of parameters ([`JointFits::one_set`]) has the smallest
-/// residual of each joint; present widths if no other has at most `max_ratio` of their residual. Separate parameters of
-/// each joint would fit a wrong step.
+/// The robot with the widths of smoothed signs for which one set of base parameters ([`JointFits::one_set`]) has the
+/// smallest residual of each joint. The present widths are kept unless others have at most `max_ratio` times their
+/// residual. One set is used because separate parameters of each joint would also fit a wrong width.
 pub(super) fn with_fitted_steps(
     robot: &ParametricModel,
     rows: &MotionRows,
@@ -42,7 +43,7 @@ fn left_by_one_set(robot: &ParametricModel, rows: &MotionRows) -> Result<Vec<f64
     Ok(left)
 }
 
-/// Updates for each joint the smallest residual and its width by the `tried` widths.
+/// Tries the widths `tried`, and updates for each joint the smallest residual and the factor on its width.
 fn narrow_down(
     robot: &ParametricModel,
     rows: &MotionRows,
@@ -62,7 +63,7 @@ fn narrow_down(
     Ok(())
 }
 
-/// The robot with the width of each joint's smooth steps times a factor; `None` if nothing changes.
+/// The robot with the width of each joint's smoothed signs multiplied by a factor; `None` if nothing changes.
 pub(super) fn with_widths(robot: &ParametricModel, times: &[f64]) -> Option<ParametricModel> {
     let widened = |term: &TorqueTerm| match term.joints()[..] {
         [joint] => term.clone().with_step(|step| match step {

@@ -1,4 +1,4 @@
-//! The search for mistakes in the training recordings.
+//! Search for mistakes in the training recordings.
 
 use super::confirmation::unless_confirmed;
 use super::description_fit::description_fit;
@@ -13,7 +13,7 @@ use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_rows::{Logs, RegressorModel};
 
-/// The input of the diagnosis.
+/// Input of the diagnosis.
 #[derive(Clone, Copy)]
 pub struct DiagnosisTask<'a> {
     /// The recordings.
@@ -22,15 +22,16 @@ pub struct DiagnosisTask<'a> {
     pub settings: &'a IdentificationSettings,
     /// The robot with the torque terms of the study.
     pub robot: &'a ParametricModel,
-    /// Numbers of the training recordings.
+    /// Indices of the training recordings.
     pub training: &'a [usize],
-    /// Base parameters of the training recordings; `None` skips held-out recordings.
+    /// Base parameters from the training recordings; `None` skips held-out recordings.
     pub theta: Option<&'a [f64]>,
 }
 
 pub(super) struct SearchedLogs {
     pub(super) search: Search,
-    /// The study as written, except for a lag; its robot has friction steps and drive inertia from the logs.
+    /// The study as written, or with its lag corrected. The robot has friction widths and drive inertia that fit the
+    /// logs.
     pub(super) study: CorrectedStudy,
     pub(super) consistency: ConsistencySettings,
     /// The compensated lag of each joint's torque, s.
@@ -39,7 +40,7 @@ pub(super) struct SearchedLogs {
     pub(super) torque_noise: Vec<f64>,
 }
 
-/// Searches the mistake that explains the training recordings best.
+/// Searches for the mistake that explains the training recordings best.
 pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, DiagnosisError> {
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
     let model = RegressorModel::from(robot.clone());
@@ -52,9 +53,10 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
         rows.append(&one.instants(instants_of_log(INSTANTS, place, samples.len())));
     }
     let torque_noise = torque_noise(&samples, robot.dof());
-    // Identification estimates unstated drive inertia; without it a mistake would have to explain this torque.
+    // An identification estimates drive inertia that the study does not state. Without it, a mistake would have to
+    // explain its torque.
     let robot = with_drives_left_to_the_logs(robot, settings)?;
-    // Scores need an accuracy of 0.01.
+    // Scores need an accuracy of only 0.01.
     let known = settings.consistency.clone().unwrap_or_default();
     let consistency = ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known };
     let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
@@ -78,15 +80,16 @@ fn torque_noise(samples: &[MotionSamples], dof: usize) -> Vec<f64> {
 }
 
 struct SearchResults {
-    /// For common mistakes, and for common and rarer ones.
+    /// Search for common mistakes, and search for common and rarer mistakes.
     searches: [Search; 2],
-    /// The study with the instants of the searches.
+    /// The study whose instants the searches use.
     study: CorrectedStudy,
-    /// The study as written.
+    /// The study as written; if a fit compensates a lag, with this lag corrected.
     written: CorrectedStudy,
 }
 
-/// Searches with the best lag of the torque: a lag hides every other mistake, and another mistake may look like a lag.
+/// Searches for mistakes, with the best lag of the torque if a lag is evident. A lag hides every other mistake, and
+/// another mistake may look like a lag.
 fn search_with_lag(
     as_written: &Explained,
     lag_search: Option<&LagSearch<'_>>,
@@ -95,7 +98,7 @@ fn search_with_lag(
     let written = as_written.study.clone();
     let late = lag_search
         .and_then(|lag_search| lag_search.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
-    // A fit compensates such a lag.
+    // A lag that a fit compensates is not a mistake.
     if let Some(late) = late.as_ref().filter(|late| late.explained.study.mistakes.is_empty()) {
         let study = late.explained.study.clone();
         let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
@@ -103,7 +106,8 @@ fn search_with_lag(
     }
     let in_time = searches(&as_written.hypothesis, as_written, consistency);
     let believed = in_time[1].believed();
-    // A lag of half a period looks like another sign, so it has to explain clearly more.
+    // In a periodic motion, a lag of half a period looks like a reversed sign. Therefore a lag must explain clearly
+    // more than other mistakes.
     let gain = as_written.hypothesis.score() - believed.score();
     let (max_ratio, min_gain) = (written.settings.late_channel.max_ratio_of_all, written.settings.score.min_gain);
     let explains_more = |late: &Explained| late.hypothesis.left_of_all < max_ratio * believed.left_of_all;
@@ -117,16 +121,16 @@ fn search_with_lag(
     }
 }
 
-/// Selects the search for common mistakes or the search for all. The latter needs a clearly smaller residual: a smaller
-/// unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far beyond its range is
-/// an exception. If most torques are still in another unit, the unit of one joint or another rate only compensates for
-/// that.
+/// Selects the result of the search for common mistakes, or of the search for all mistakes. The latter needs a clearly
+/// smaller residual. (With a smaller position unit of one joint, fewer joint limits are exceeded, but these limits may
+/// be wrong.) A joint that travels far beyond its range is an exception. Another unit of one joint, or another sample
+/// rate, is not accepted if most torques are then still in another unit, because it would only compensate for that.
 fn select_search(searches: [Search; 2], study: &CorrectedStudy) -> Search {
     let [usual, all] = searches;
     let (best, tried) = (all.believed(), all.tried);
     let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - study.settings.score.min_gain;
     let is_shown_by_torque = gains(Hypothesis::torque_score) || best.is_shown_by_travel();
-    // Such a factor scales torque against motion, as the bodies of another robot do.
+    // Such a factor changes the ratio of torque to motion, as the bodies of another robot do.
     let has_free_factor = best.mistakes.iter().any(|mistake| {
         let facts = mistake.facts();
         facts.torque_gain.is_some() || facts.is_other_rate

@@ -1,4 +1,4 @@
-//! A payload in one log that is not in the other logs.
+//! Detection of a payload that one log has and the other logs do not have.
 
 use super::explanation::predicted;
 use super::motion_rows::MotionRows;
@@ -6,30 +6,30 @@ use crate::diagnosis_settings::HeldOutSettings;
 use dynident_dynamics::{ParametricModel, Workspace, torque_regressor};
 use nalgebra::{DMatrix, DVector};
 
-/// Added to the squares of the columns, relative to the largest.
+/// Regularisation that is added to the squares of the columns, relative to the largest square.
 const RIDGE: f64 = 1.0e-9;
-/// Ratio of residuals to independent residuals: neighbours are correlated.
+/// Ratio of the number of residuals to the number of independent residuals; neighbouring residuals are correlated.
 const CORRELATED_RESIDUALS: f64 = 10.0;
 
-/// A payload at the last body in one log that is not in the model.
+/// A payload at the last body in one log that the model does not contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnmodelledPayload {
-    /// Number of the recording.
+    /// Index of the recording.
     pub log: usize,
-    /// Its mass, kg; negative if the training logs have the payload.
+    /// Mass of the payload, kg; negative if the training logs have the payload and this log does not.
     pub mass_kg: f64,
     /// Standard deviation of the mass, kg.
     pub mass_std_kg: f64,
-    /// Its centre of mass in the frame of the last body, m.
+    /// Centre of mass of the payload in the frame of the last body, m.
     pub com_m: [f64; 3],
-    /// Residual without the payload, root mean square of all joints, Nm.
+    /// Root mean square residual of all joints without the payload in the model, Nm.
     pub left_without: f64,
-    /// The same with the payload.
+    /// Root mean square residual of all joints with the payload in the model, Nm.
     pub left_with: f64,
 }
 
-/// Estimates a payload at the last body in recording number `log`, whose instants are `rows`, from the residual of base
-/// parameters `theta`.
+/// Estimates a payload at the last body in recording number `log` from the residual with base parameters `theta`.
+/// `rows` are the instants of this recording.
 pub(super) fn unmodelled_payload(
     robot: &ParametricModel,
     rows: &MotionRows,

@@ -1,4 +1,4 @@
-//! Torques of random robots that differ from the description by usual errors.
+//! Torque of random robots that differ from the description by usual errors.
 
 use super::explanation::{predicted, without_terms};
 use super::motion_rows::MotionRows;
@@ -6,13 +6,14 @@ use crate::consistent::{ConsistencySettings, usual_errors_of_bodies};
 use dynident_dynamics::ParametricModel;
 use dynident_model::sample::Random;
 
-/// Added thickness of bodies relative to their extent, since descriptions contain rods.
+/// Thickness that is added to bodies, relative to their extent, because descriptions contain thin rods.
 const ADDED_THICKNESS: f64 = 0.3;
 const ROBOTS: usize = 100;
 const SEED: u64 = 0x6f77_6e20_726f_626f;
 
-/// The torque of the bodies of [`ROBOTS`] random robots in the motion of `rows`, one vector for each joint, Nm (N). The
-/// errors are those of [`usual_errors_of_bodies`], with a fixed seed. `None` while a body's inertials are unknown.
+/// Torque of the bodies of [`ROBOTS`] random robots for the motion in `rows`, one vector for each joint, Nm (N). The
+/// random errors are those of [`usual_errors_of_bodies`], with a fixed seed. `None` if inertial parameters of a body
+/// are unknown.
 pub(super) fn torques_of_likely_robots<'a>(
     robot: &'a ParametricModel,
     rows: &'a MotionRows,

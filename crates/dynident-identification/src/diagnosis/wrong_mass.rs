@@ -1,4 +1,4 @@
-//! One wrong mass in the description, as an alternative to another unit of every torque.
+//! Test for one wrong mass in the description, as an alternative to another unit of all torques.
 
 use super::friction_spans::FrictionSpans;
 use super::motion_rows::MotionRows;
@@ -9,18 +9,20 @@ use dynident_model::InertialParameters;
 /// A body with a wrong mass that explains the torques better than another unit of each torque.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrongMass {
-    /// The body's number.
+    /// Index of the body.
     pub body: usize,
-    /// Factor on its mass and inertia.
+    /// Correct mass and inertia divided by the described values.
     pub factor: f64,
-    /// Unexplained share of the torques without friction after the correction (root mean squares).
+    /// Unexplained share of the torques after the correction, with friction removed (root mean squares).
     pub left: f64,
 }
 
-/// The body whose factor has a smaller residual than a separate factor for every joint, `left_by_scales` (the sum over
-/// joints of squared residuals relative to the torque without friction), and is outside of `usual_ratios`.
+/// Finds a body with a factor on its mass and inertia that explains the torques better than a separate factor for every
+/// joint. The factor must be outside of `usual_ratios`. `left_by_scales` is the residual with separate factors: the sum
+/// over joints of squared residuals relative to the torque, with friction removed.
 ///
-/// Without friction, drive inertia and offset, `τ - τ_others = s τ_body` has one unknown for all joints.
+/// After friction, drive inertia and offset are removed, `τ - τ_others = s τ_body` has a single unknown s for all
+/// joints.
 pub(super) fn wrong_mass(
     robot: &ParametricModel,
     rows: &MotionRows,

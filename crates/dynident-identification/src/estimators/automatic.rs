@@ -1,4 +1,5 @@
-//! Automatic selection: weighted least squares, or instruments if noise in the regressor biases it.
+//! Automatic selection of the estimator: weighted least squares, or instrumental variables if noise in the regressor
+//! biases least squares.
 
 use super::exogeneity::{examined, harmless};
 use super::instrumental::InstrumentSettings;
@@ -6,7 +7,8 @@ use super::noise_in_regressor::{NoiseInRegressor, NoiseVerdict};
 use super::{Estimation, EstimatorError, TrainingRows};
 use dynident_estimation::{Estimate, EstimateStatus, InstrumentalEstimate};
 
-/// The weighted estimate, or that of instruments if least squares is biased and the instruments are strong.
+/// The estimate by weighted least squares, or by instrumental variables if least squares is biased and the instruments
+/// are strong.
 pub(super) fn automatic(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -25,9 +27,9 @@ pub(super) fn automatic(
     Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(estimate) })
 }
 
-/// Tests the effect of noise on least squares; returns the instruments' estimate if it was needed. `None` if the test
-/// is not possible. It requires columns of the robot only, all of them free, rows for all joints, and pieces of logs
-/// that are long enough for a lower filter.
+/// Tests the effect of noise in the regressor on least squares, and returns the instrumental-variables estimate if it
+/// was computed. `None` if the test is not possible. The test requires that all columns belong to the robot and are
+/// free, that all joints have rows, and that the pieces of the logs are long enough for a filter with a lower cut-off.
 pub(super) fn examined_where_possible(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -47,7 +49,7 @@ pub(super) fn examined_where_possible(
     });
     match found {
         Ok(found) => Ok(Some(found)),
-        // Without the test the estimate is still valid.
+        // If the test fails, the least-squares estimate is still valid.
         Err(EstimatorError::Estimation(_) | EstimatorError::Instruments { .. }) => Ok(None),
         Err(error) => Err(error),
     }

@@ -1,4 +1,4 @@
-//! Instruments from the motion of a log behind an additional low-pass, without reading the file again.
+//! Instruments from the motion of a log after an additional low-pass, without reading the file again.
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
@@ -9,10 +9,10 @@ use dynident_rows::{LogError, LogPass};
 /// Order of the low-pass, equal to the default of the differentiator.
 const ORDER: usize = 4;
 
-/// One uninterrupted segment: q, dq, ddq of every joint of the log.
+/// Positions, velocities and accelerations of every joint of the log in one uninterrupted segment.
 type Piece = Vec<[Vec<f64>; 3]>;
 
-/// The positions of a log after the differentiator and a zero-phase Butterworth filter.
+/// Motion from the positions of a log after the differentiator and an additional zero-phase Butterworth filter.
 pub(super) struct BandMotion<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     cutoff_hz: f64,
@@ -82,7 +82,7 @@ impl InstrumentSource for BandMotion<'_, '_> {
     }
 }
 
-/// Positions of a log by segment and joint, and their rate.
+/// Sample rate, and the positions of a log by segment and joint.
 type Positions = (f64, Vec<(usize, Vec<Vec<f64>>)>);
 
 fn positions(rows: &TrainingRows<'_>, log: usize, most_samples: Option<u64>) -> Result<Positions, LogError> {
@@ -103,8 +103,8 @@ fn positions(rows: &TrainingRows<'_>, log: usize, most_samples: Option<u64>) -> 
     Ok((rate_hz, pieces))
 }
 
-/// Cut-off of the motion in the regressor: the one in use, or the highest suggested by the longest piece of each
-/// training log.
+/// Cut-off of the positions that the regressor is computed from: the cut-off in use, or the highest one that the
+/// longest piece of each training log suggests.
 pub(super) fn regressor_cutoff_hz(rows: &TrainingRows<'_>) -> Result<f64, LogError> {
     if let Some(cutoff_hz) = rows.logs.motion.differentiator.cutoff_hz() {
         return Ok(cutoff_hz);

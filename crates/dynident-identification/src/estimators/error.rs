@@ -4,11 +4,11 @@ use dynident_estimation::EstimationError;
 use dynident_rows::LogError;
 use thiserror::Error;
 
-/// Reason for a missing estimate.
+/// Reason why an estimator returns no estimate.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EstimatorError {
-    /// A recording gives no rows.
+    /// A recording cannot be read or gives no rows.
     #[error("{0}")]
     Log(#[from] LogError),
     /// The rows do not determine an estimate.

@@ -1,10 +1,11 @@
-//! Test for bias of least squares by noise in the regressor, and selection of instruments.
+//! Test whether noise in the regressor biases least squares, and selection of the cut-off of instruments.
 //!
-//! Instruments with half the regressor's cut-off contain the motion and hardly any noise of the accelerations (for
-//! white position noise 3 % of its power). Least squares is biased if the torque does not follow the fast motion, which
-//! these instruments remove ([`fast_motion`]), *and* the estimates differ by more than their error bars. Then the
-//! cut-off of the instruments is lowered. The highest cut-off is selected below which the estimate no longer changes
-//! (Lepski, Theory Probab. Appl. 35 (1990) 454): a compromise between noise and motion content.
+//! Instruments are regressor columns from a motion with less noise. With half the cut-off of the regressor, they
+//! contain the motion, but hardly any noise of the accelerations (for white position noise, 3 % of its power). Least
+//! squares is treated as biased if two conditions are met: the torque does not follow the fast motion that the lower
+//! cut-off removes ([`fast_motion`]), *and* the estimates with and without instruments differ by more than their error
+//! bars. Then the cut-off of the instruments is lowered. The highest cut-off is selected below which the estimate no
+//! longer changes (Lepski, Theory Probab. Appl. 35 (1990) 454). It is a compromise between noise and motion content.
 
 use super::band_motion::regressor_cutoff_hz;
 use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
@@ -16,15 +17,16 @@ use dynident_estimation::{
     weighted_least_squares,
 };
 
-/// Ratios to the regressor's cut-off, tried in turn until the instruments are strong.
+/// Ratios of the instruments' cut-off to the regressor's cut-off. They are tried in this order until the instruments
+/// are strong.
 const CUTOFF_RATIOS: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
-/// Ratio of neighbouring bands.
+/// Ratio of successive cut-offs that are tried.
 const BAND_RATIO: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// Maximum number of bands below the first: six octaves.
+/// Maximum number of cut-offs below the first: six octaves.
 const MAX_BANDS: usize = 12;
 
-/// Tests least squares with the logs' own motion in a lower band, and returns the instruments' estimate in the selected
-/// band.
+/// Tests least squares with instruments from the logs' own motion at a lower cut-off, and returns the
+/// instrumental-variables estimate with the selected cut-off.
 pub(super) fn examined(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -49,7 +51,7 @@ pub(super) fn examined(
     let verdict = if is_suspect && !agrees(&chosen) {
         NoiseVerdict::BiasesLeastSquares
     } else if fast.is_none() || chosen.found.instruments.weak {
-        // Weak instruments agree with least squares in any case.
+        // With weak instruments, the estimate agrees with least squares in any case.
         NoiseVerdict::Undecided
     } else {
         NoiseVerdict::Harmless
@@ -62,8 +64,9 @@ pub(super) fn examined(
     Ok((chosen.found, noise))
 }
 
-/// A fast test whether noise can matter, from the torques of the complete motion and of its part below half the cut-off
-/// (some milliseconds, compared with tens for instruments). `None` if instruments are needed.
+/// Fast test whether noise can matter. It compares the torques of the complete motion and of its part below half the
+/// cut-off, in some milliseconds; instruments need tens of milliseconds. `None` if instruments are needed for a
+/// decision.
 pub(super) fn harmless(
     rows: &TrainingRows<'_>,
     least_squares: &Estimate,
@@ -96,7 +99,7 @@ pub(super) fn harmless(
     Ok(Some(NoiseInRegressor { verdict: NoiseVerdict::Harmless, ..NoiseInRegressor::of_test(instruments, test) }))
 }
 
-/// The lowest cut-off ratio with strong instruments, or the highest ratio.
+/// Estimate with the lowest of the cut-off ratios for which the instruments are strong, or else with the highest ratio.
 fn first_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -113,7 +116,7 @@ fn first_band(
     Ok(band)
 }
 
-/// The highest band below which the estimate no longer changes.
+/// Estimate with the highest cut-off below which the estimate no longer changes.
 fn highest_stable_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -122,7 +125,7 @@ fn highest_stable_band(
 ) -> BandEstimate {
     let mut bands = vec![first];
     while let Some(last) = bands.last().filter(|_| bands.len() <= MAX_BANDS) {
-        // If a piece is too short for a low filter, the previous bands are used.
+        // If a piece is too short for a filter with this cut-off, only the previous cut-offs are used.
         let Ok(band) = with_band(rows, settings, BAND_RATIO * last.cutoff_hz) else { break };
         if !is_strong(&band, least_squares) {
             break;
@@ -137,7 +140,7 @@ fn highest_stable_band(
     bands.swap_remove(place)
 }
 
-/// Whether the instruments determine all columns that least squares determines, and are strong.
+/// Whether the instruments are strong and determine all columns that least squares determines.
 fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
     let found = &band.found;
     !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()
@@ -149,7 +152,7 @@ fn agree(a: &Estimate, b: &Estimate, thresholds: &NoiseThresholds) -> bool {
     })
 }
 
-/// `a − b` in standard deviations of b, over the columns that both estimate.
+/// Difference `a − b` of two estimates in standard deviations of b, over the columns that both estimate.
 fn contrast(a: &Estimate, b: &Estimate) -> Option<EstimateContrast> {
     let differences: Vec<(usize, f64)> = (0..b.values.len().min(a.values.len()))
         .filter(|&column| a.std[column] > 0.0 && b.std[column] > 0.0)

@@ -1,22 +1,22 @@
-//! A custom estimator: a rule of the caller that uses the factors of the rows.
+//! A custom estimator: a function of the caller that computes an estimate from the triangular factors of the rows.
 
 use super::{EstimatorError, TrainingRows};
 use core::fmt::Debug;
 use dynident_estimation::{CustomEstimate, Estimate, EstimatorRows, estimate_by};
 use std::sync::Arc;
 
-/// A custom estimator on the rows of all joints. It returns values and an optional covariance.
+/// Interface of a custom estimator. It computes values and an optional covariance from the rows of all joints.
 pub trait EstimatorRule: Debug + Send + Sync {
     /// Returns one value for each column of the rows.
     fn estimate(&self, rows: &EstimatorRows) -> CustomEstimate;
 }
 
-/// An [`EstimatorRule`] with its name. Settings that were read from a file only have the name.
+/// A custom estimator ([`EstimatorRule`]) with its name. If the settings were read from a file, only the name is known.
 #[derive(Clone, Debug)]
 pub struct EstimatorFunction {
     /// Name in messages.
     pub name: String,
-    /// The rule.
+    /// The estimator; `None` if only its name is known.
     pub rule: Option<Arc<dyn EstimatorRule>>,
 }
 

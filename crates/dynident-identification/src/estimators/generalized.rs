@@ -1,4 +1,4 @@
-//! Generalised least squares: the rows of all joints at an instant in one factor.
+//! Generalised least squares: the rows of all joints at an instant are combined in one triangular factor.
 
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
@@ -7,7 +7,7 @@ use dynident_rows::{JointRows, LogError, RowConsumer};
 struct SideBySide {
     factor: SegmentedFactor,
     panel: Vec<f64>,
-    /// Smallest coverage over the joints, by row; empty if all samples are valid.
+    /// For each row, the smallest coverage over the joints; empty if all samples are valid.
     coverage: Vec<f64>,
     counted: Vec<f64>,
     joints: usize,
@@ -15,7 +15,7 @@ struct SideBySide {
 
 impl RowConsumer for SideBySide {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        // Joints of a block arrive in order, with the same number of rows.
+        // The joints of a block arrive in order, with the same number of rows.
         if rows.joint == 0 {
             self.panel.clear();
             self.coverage.clear();
@@ -26,7 +26,7 @@ impl RowConsumer for SideBySide {
             self.coverage.iter_mut().zip(rows.coverage).for_each(|(least, own)| *least = least.min(*own));
         }
         if rows.joint + 1 == self.joints {
-            // An instant is valid if it is valid for every joint.
+            // An instant is valid only if it is valid for every joint.
             let all = JointRows { panel: &self.panel, coverage: &self.coverage, ..*rows };
             let counted = all.counted(&mut self.counted);
             self.factor.absorb(counted.panel, counted.rows)?;

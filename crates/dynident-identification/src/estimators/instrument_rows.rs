@@ -1,4 +1,5 @@
-//! Rows of a log with their instruments, `[Z | W | τ]`: both motions pass the same regressor and parallel filter.
+//! Rows of a log with their instruments, `[Z | W | τ]`: instruments Z from a second motion, regressor W from the
+//! measured motion, and torque τ, all after the same parallel filter.
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
@@ -12,7 +13,7 @@ use dynident_rows::{
 };
 use std::borrow::Cow;
 
-/// Factors of `[Z | W | τ]` of one log, one for each joint.
+/// Triangular factors of `[Z | W | τ]` of one log, one for each joint.
 pub(super) fn instrumented_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -21,8 +22,8 @@ pub(super) fn instrumented_factors(
     made_rows(rows, index, None, None, source).map(|made| made.factors)
 }
 
-/// Factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's `‖(W −
-/// Z) θ‖²`.
+/// Triangular factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and
+/// `‖(W − Z) θ‖²` of each joint.
 pub(super) fn fast_motion_factors(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -66,7 +67,7 @@ fn made_rows<'r, 'a>(
     refused.map_or(Ok(builder), Err)
 }
 
-/// Marks of samples that are invalid in the measured motion or at the ends of the instruments' motion.
+/// For each sample, whether it is invalid in the measured motion or extrapolated at an end of the instruments' motion.
 fn left_out<'m>(
     measured: &'m MotionBlock,
     instruments: &MotionBlock,
@@ -88,16 +89,16 @@ struct InstrumentedRows<'r, 'a> {
     log: String,
     label: String,
     places: Vec<usize>,
-    /// Parameters, if only the torques of both motions are needed.
+    /// Base parameters, if only the torques of both motions are needed; `None` for complete regressors.
     theta: Option<&'r [f64]>,
-    /// Columns of each joint's rows except the last.
+    /// Number of columns in each joint's rows, without the last.
     widths: Vec<usize>,
-    /// Sum of squares of each joint's first filtered column.
+    /// Sum of squares of the first filtered column of each joint.
     squares: Vec<f64>,
-    /// Built with the first block, because it defines the rate.
+    /// Filters; created with the first block, because it defines the sample rate.
     filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
-    /// Row makers of both motions, instruments first.
+    /// Regressors of both motions, the instruments first.
     makers: [RowMaker; 2],
     other: MotionBlock,
     temperature_c: Vec<f64>,
@@ -121,7 +122,8 @@ impl RowMaker {
         Self { workspace, history, panels: Panels::default(), motion: Default::default() }
     }
 
-    /// Computes the panels of some samples of `block`, whose joints have the indices `places`.
+    /// Computes the regressor panels of some samples of `block`. The joints of the model have the indices `places` in
+    /// the block.
     fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], from: usize, samples: usize) {
         in_model_order(block, places, from, samples, &mut self.motion);
         let [q, dq, ddq] = &self.motion;
@@ -228,7 +230,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     self.panel.extend_from_slice(&own.joint(joint)[..width]);
                     self.panel.extend(torque.iter().map(|torque| gain * torque));
                 }
-                // Mask invalid samples in both motions and the torque, as in the rows of a fit.
+                // Invalid samples are excluded from both motions and from the torque, as in the rows of a fit.
                 let left_out = left_out(measured, &self.other, place, from, samples);
                 let rows = filters.push(joint, &self.panel, samples, &left_out).counted(&mut self.counted);
                 if rows.rows > 0 {

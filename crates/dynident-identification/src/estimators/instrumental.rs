@@ -12,20 +12,21 @@ use dynident_estimation::{
 use dynident_rows::Samples;
 use serde::{Deserialize, Serialize};
 
-/// Instruments from the motion of the log itself, with a lower cut-off than in the regressor.
+/// Settings of instrumental variables from the motion of the log itself, with a lower cut-off than in the regressor.
 ///
-/// They do not contain noise above their cut-off. Noise below it remains, but is small if the motion is slow compared
-/// with the noise.
+/// The instruments do not contain noise above their cut-off. Noise below it remains, but is small if the motion is slow
+/// compared with the noise.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSettings {
-    /// Cut-off of the zero-phase Butterworth filter of fourth order, hertz. By default half of the regressor's cut-off,
-    /// which contains the motion; if noise is significant, lower while the estimate still changes.
+    /// Cut-off of the zero-phase Butterworth filter of fourth order for the instruments, hertz. By default half of the
+    /// regressor's cut-off, which still contains the motion. If noise is significant, the default is lowered as long as
+    /// the estimate still changes.
     pub cutoff_hz: Option<f64>,
-    /// First-stage F below which instruments are weak; 10 by default.
+    /// First-stage F statistic below which instruments are weak; 10 by default.
     pub weak_below: Option<f64>,
-    /// Probability of rejecting least squares if it is correct; 0.01 by default.
+    /// Probability that the test rejects least squares although it is correct; 0.01 by default.
     pub test_level: Option<f64>,
 }
 
@@ -66,7 +67,7 @@ fn band_source<'r>(
 ) -> Box<dyn InstrumentSource + 'r> {
     match rows.logs.recordings[index].samples {
         Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz, most_samples)),
-        // From raw samples, if available.
+        // The instruments are computed from raw samples, if these are available.
         Samples::Motion(_) => Box::new(SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz)),
     }
 }
@@ -81,12 +82,14 @@ fn of_every_log<T: Send>(
     of_logs
 }
 
-/// Maximum number of samples of all logs for the test of the fast motion, and minimum per log. The test estimates one
-/// coefficient, so minutes of recording are sufficient, and memory does not grow with a log.
+/// For the test of the fast motion: maximum number of samples of all logs, and minimum number per log. The test
+/// estimates only one coefficient, so minutes of recording are sufficient, and memory does not grow with the length of
+/// a log.
 const FAST_MOTION_SAMPLES: [u64; 2] = [200_000, 20_000];
 
-/// Problem `τ − Z θ = κ (W − Z) θ` with a single κ and Z from the logs' motion below `cutoff_hz`, and each joint's `‖(W
-/// − Z) θ‖²`. Long logs contribute their beginnings, and the squares are scaled to the number of rows of the problem.
+/// Least-squares problem `τ − Z θ = κ (W − Z) θ` with a single unknown κ, and `‖(W − Z) θ‖²` of each joint. The
+/// regressor Z uses the logs' motion below `cutoff_hz`, the regressor W the complete motion. Only the beginning of a
+/// long log is used; the squares are scaled to the number of rows of the complete problem.
 pub(super) fn fast_motion_problem(
     rows: &TrainingRows<'_>,
     cutoff_hz: f64,
@@ -112,7 +115,7 @@ pub(super) fn fast_motion_problem(
     Ok((problem, squares))
 }
 
-/// Uses the logs' motion below `cutoff_hz` as instruments.
+/// Estimate with the logs' motion below `cutoff_hz` as instruments.
 pub(super) fn with_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -125,7 +128,7 @@ pub(super) fn with_band(
     Ok(BandEstimate { cutoff_hz, problem, found })
 }
 
-/// The instrumental estimate and the test, with instruments from any source.
+/// The instrumental-variables estimate and the test of least squares, with instruments from any source.
 pub(super) fn with_instruments(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
@@ -143,7 +146,7 @@ pub(super) fn with_instruments(
     Ok((found, noise))
 }
 
-/// Rows of all logs over one set of columns; `factors` has one list for each training log.
+/// Rows of all logs with one set of columns; `factors` contains one list for each training log.
 fn instrumented_problem(
     rows: &TrainingRows<'_>,
     factors: Vec<Vec<SegmentedFactor>>,

@@ -1,29 +1,31 @@
-//! Instruments for a log: a second description of the same motion whose noise is independent of the first.
+//! Instruments for a log: a second measurement or simulation of the same motion, whose noise is independent of the
+//! first.
 
 use super::EstimatorError;
 use dynident_model::Model;
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
 use dynident_rows::{LogError, Logs};
 
-/// Source of the instruments' motion: [`SmoothedMotion`] of the same log, or a simulation of the closed loop with the
-/// current model, provided by another crate.
+/// Source of the motion for instruments: [`SmoothedMotion`] of the same log, or a simulation of the closed loop with
+/// the current model, which another crate provides.
 pub trait InstrumentSource: Send {
-    /// Begins a new pass over recording `log` of the task.
+    /// Begins a new pass over the recording with the index `log`.
     ///
     /// # Errors
     /// There is no motion for this log.
     fn begin(&mut self, log: usize) -> Result<(), EstimatorError>;
 
     /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, joints in the order of the log, SI units) for the
-    /// samples of `measured`, which arrive in order of time. Rows and segment are those of `measured`. Samples at the
-    /// ends that a filter extrapolated can be excluded by `unsettled`. Other fields of `instruments` are ignored.
+    /// samples of `measured`, which arrive in order of time. Number of rows and segment are already set as in
+    /// `measured`. `unsettled` can exclude samples at the ends that a filter extrapolated. Other fields of
+    /// `instruments` are ignored.
     ///
     /// # Errors
     /// The motion does not cover these samples.
     fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError>;
 }
 
-/// The motion of the log itself through another filter.
+/// The motion of the log itself after another filter.
 #[derive(Debug)]
 pub struct SmoothedMotion<'a> {
     logs: &'a Logs<'a>,
@@ -36,7 +38,7 @@ pub struct SmoothedMotion<'a> {
 }
 
 impl<'a> SmoothedMotion<'a> {
-    /// The motion of the task's logs below `cutoff_hz`, trimmed as in the regressor.
+    /// The motion of the logs below `cutoff_hz`. Its ends are cut as in the regressor.
     pub fn new(logs: &'a Logs<'a>, model: &'a Model, cutoff_hz: f64) -> Self {
         let differentiator = DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(cutoff_hz) };
         let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };

@@ -1,8 +1,8 @@
 //! Estimators of base parameters from the rows of training logs, with their settings and findings.
 //!
-//! **To add an estimator**, three files: one here with its settings and a function from [`TrainingRows`] to an
-//! [`Estimate`]; a variant of [`Estimator`]; and its name in the study file (`study/estimator.rs` of `dynident`). The
-//! compiler reports the other places.
+//! **To add an estimator**, change three files: add one here with its settings and a function from [`TrainingRows`] to
+//! an [`Estimate`], add a variant of [`Estimator`], and add its name in the study file (`study/estimator.rs` of
+//! `dynident`). The compiler reports the other places that need a change.
 
 mod automatic;
 mod band_motion;
@@ -49,47 +49,50 @@ use dynident_estimation::{
 use dynident_rows::{Logs, RegressorModel};
 use simulated_loop::ComparedSignal;
 
-/// Method for the estimation of base parameters, with its settings.
+/// Estimator of base parameters, with its settings.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub enum Estimator {
-    /// Ordinary least squares: equal weights of all joints.
+    /// Ordinary least squares: all joints have equal weights.
     Ordinary,
     /// Weighted least squares: joints are weighted by their noise.
     #[default]
     Weighted,
-    /// Generalised least squares: errors of the joints at one instant are correlated.
+    /// Generalised least squares: takes the correlation between the errors of the joints at one instant into account.
     Generalized,
-    /// Iteratively reweighted least squares with Huber's weights: outliers get less weight.
+    /// Iteratively reweighted least squares with Huber's weights: rows with large residuals get less weight.
     Huber,
-    /// Iteratively reweighted least squares with Tukey's weights: outliers are ignored.
+    /// Iteratively reweighted least squares with Tukey's weights: rows with very large residuals are ignored.
     Tukey,
-    /// Reweighted by the local noise level: noisy parts of a joint's rows get less weight.
+    /// Least squares reweighted by the local noise level: noisy parts of a joint's rows get less weight.
     NoiseWeighted(NoiseLevels),
     /// Weighted least squares, or instrumental variables if noise in the regressor biases it and the instruments are
     /// strong.
     Auto(InstrumentSettings),
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental(InstrumentSettings),
-    /// A caller's rule on the factors of the rows.
+    /// A function of the caller that uses the triangular factors of the rows.
     Function(EstimatorFunction),
-    /// The same as [`SplineMotion`](Self::SplineMotion), under the name of an earlier method for repeated motions.
+    /// The same estimator as [`SplineMotion`](Self::SplineMotion), under the name of an earlier method for repeated
+    /// motions.
     MaximumLikelihood(SplineMotionSettings),
-    /// Motion and parameters together, for a motion that is a Fourier series, weighted by the noise of positions and
-    /// torques.
+    /// Estimates motion and parameters together, weighted by the noise of positions and torques. The motion must be a
+    /// Fourier series.
     Simultaneous(PeriodSettings),
-    /// The same for any motion, as a smoothing spline whose smoothness follows from the likelihood.
+    /// Estimates motion and parameters together for any motion, which is described by a smoothing spline. The
+    /// likelihood determines its smoothness.
     SplineMotion(SplineMotionSettings),
-    /// Regression on the motion of the simulated closed loop, without measured positions in the regressor.
+    /// Linear regression with the regressor of the simulated closed-loop motion, so that the regressor contains no
+    /// measured positions (DIDIM).
     Didim(Box<SimulatedLoopSettings>),
-    /// Fits the torque of the simulated closed loop to the measured torque (closed-loop input error).
+    /// Fits the torque of the simulated closed loop to the measured torque (closed-loop input error, CLIE).
     Clie(Box<SimulatedLoopSettings>),
-    /// Fits the positions of the simulated closed loop to the measured positions (closed-loop output error).
+    /// Fits the positions of the simulated closed loop to the measured positions (closed-loop output error, CLOE).
     Cloe(Box<SimulatedLoopSettings>),
 }
 
 impl Estimator {
-    /// Name in files and messages.
+    /// Name of the estimator in files and messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Ordinary => "ordinary",
@@ -109,7 +112,8 @@ impl Estimator {
         }
     }
 
-    /// Whether the values are those of least squares with one weight per joint; for `Auto` before it finds noise.
+    /// Whether the values are computed by least squares with one weight per joint. True for `Auto`, which starts with
+    /// least squares.
     pub fn is_plain(&self) -> bool {
         match self {
             Self::Ordinary | Self::Weighted | Self::Auto(_) => true,
@@ -130,8 +134,8 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// Whether the estimator uses rows of the measured motion, filtered as the torque, so that a lag estimated from
-    /// these rows applies to it.
+    /// Whether the estimator uses rows of the measured motion that are filtered like the torque. A lag that is
+    /// estimated from such rows then also applies to this estimator.
     pub fn reads_filtered_rows(&self) -> bool {
         match self {
             Self::Ordinary
@@ -153,11 +157,11 @@ impl Estimator {
     }
 }
 
-/// Findings of an estimator in addition to its estimate. Exhaustive, so that the compiler reports a new kind to code
-/// that writes results.
+/// Findings of an estimator in addition to the estimate. The list is exhaustive, so that the compiler reports a new
+/// kind to code that writes results.
 #[derive(Clone, Debug, Default)]
 pub enum Findings {
-    /// Nothing.
+    /// No findings.
     #[default]
     None,
     /// Weights of the rows in a robust estimator.
@@ -166,9 +170,9 @@ pub enum Findings {
     NoiseCorrelation(Vec<Vec<f64>>),
     /// Lowest and highest noise level of each joint's rows, Nm (N).
     NoiseLevels(Vec<[f64; 2]>),
-    /// Motion and noise of every training log in the simultaneous fit.
+    /// Fourier motion and noise of every training log, from the simultaneous fit.
     Series(Vec<SeriesFit>),
-    /// Motion as a smoothing spline and noise of every training log.
+    /// Spline motion and noise of every training log.
     Spline(SplineFit),
     /// Fit to a simulated closed loop.
     Simulated(SimulatedFit),
@@ -181,7 +185,7 @@ pub struct Estimation {
     pub estimate: Estimate,
     /// Findings of the estimator.
     pub findings: Findings,
-    /// Comparison of least squares with instruments, if made.
+    /// Comparison of least squares with instrumental variables; `None` if not made.
     pub noise_in_regressor: Option<NoiseInRegressor>,
 }
 
@@ -192,7 +196,7 @@ impl Estimation {
     }
 }
 
-/// Rows for the estimation: as factors, and as logs for estimators that read the rows again.
+/// Rows for the estimation: as triangular factors, and as logs for estimators that read the rows again.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingRows<'a> {
     /// All recordings of the task.
@@ -205,7 +209,7 @@ pub struct TrainingRows<'a> {
     pub problem: &'a LinearProblem,
     /// Estimator and error bars.
     pub settings: &'a EstimationSettings,
-    /// Prior knowledge of the bodies, for simulations that start at a consistent set.
+    /// Prior knowledge of the bodies, for simulations that start at a physically consistent set.
     pub consistency: Option<&'a ConsistencySettings>,
 }
 
@@ -215,8 +219,8 @@ impl TrainingRows<'_> {
     }
 }
 
-/// Computes the estimate, and tests the effect of noise in the regressor on least squares if requested, with
-/// instruments from `source` or from the logs' own motion.
+/// Computes the estimate. If requested, tests the effect of noise in the regressor on least squares, with instruments
+/// from `source` or from the logs' own motion.
 ///
 /// # Errors
 /// The rows do not determine an estimate, or a requirement of the estimator is not met.
@@ -239,7 +243,7 @@ pub fn estimate(
     }
     let (estimate, findings) = without_instruments(rows)?;
     let mut estimation = Estimation { findings, ..Estimation::plain(estimate) };
-    // Instruments are always compared with least squares.
+    // An instrumental-variables estimate is always compared with least squares.
     let compared = if settings.estimator.is_plain() { None } else { Some(weighted) };
     let least_squares = || compared.map_or_else(|| Ok(estimation.estimate.clone()), |weighted| weighted());
     estimation.noise_in_regressor = match &settings.exogeneity_test {

@@ -1,4 +1,4 @@
-//! Reported effect of noise in the regressor on least squares.
+//! Report on the effect of noise in the regressor on least squares.
 
 use dynident_estimation::{FastMotion, HausmanTest, InstrumentReport};
 use serde::{Deserialize, Serialize};
@@ -8,16 +8,17 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseVerdict {
-    /// Not significant: torque also follows the fast motion, or the estimates agree within their error bars.
+    /// Not significant: the torque also follows the fast motion, or the estimates with and without instruments agree
+    /// within their error bars.
     Harmless,
-    /// Bias of least squares that exceeds the error bars.
+    /// Least squares is biased by more than its error bars.
     BiasesLeastSquares,
     /// Not determined, or not tested.
     #[default]
     Undecided,
 }
 
-/// Difference of two estimates of the same parameters, in error bars (standard deviations) of the second.
+/// Difference of two estimates of the same parameters, in standard deviations of the second estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EstimateContrast {
@@ -25,11 +26,11 @@ pub struct EstimateContrast {
     pub rms: f64,
     /// Largest difference.
     pub largest: f64,
-    /// Parameter with the largest difference.
+    /// Symbol of the parameter with the largest difference.
     pub column: String,
 }
 
-/// Results of the test for noise in the regressor.
+/// Results of the test whether noise in the regressor biases least squares.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NoiseInRegressor {
@@ -37,22 +38,23 @@ pub struct NoiseInRegressor {
     pub instrument_cutoff_hz: Option<[f64; 2]>,
     /// Strength of the instruments.
     pub instruments: InstrumentReport,
-    /// Hausman test of least squares against instruments.
+    /// Hausman test that compares least squares with instrumental variables.
     pub hausman: HausmanTest,
-    /// Effect on least squares.
+    /// Verdict about the effect on least squares.
     #[serde(default)]
     pub verdict: NoiseVerdict,
-    /// Whether torque follows the fast part of the motion, which instruments with half the regressor's cut-off do not
-    /// contain; `None` if not determined.
+    /// Whether the torque follows the fast part of the motion, which instruments with half the regressor's cut-off do
+    /// not contain; `None` if not determined.
     #[serde(default)]
     pub fast_motion: Option<FastMotion>,
-    /// Difference of least squares and instruments; `None` for external instruments.
+    /// Difference between the estimates of least squares and of instrumental variables; `None` for external
+    /// instruments.
     #[serde(default)]
     pub least_squares: Option<EstimateContrast>,
-    /// Whether `method = "auto"` selected the instruments' estimate.
+    /// Whether `method = "auto"` selected the estimate of instrumental variables.
     #[serde(default)]
     pub instruments_taken: bool,
-    /// Automatic cut-off of the regressor before it was lowered because of noise, Hz.
+    /// Automatic cut-off of the regressor before it was lowered because of noise, Hz; null if it was not lowered.
     #[serde(default)]
     pub cutoff_before_hz: Option<f64>,
 }

@@ -1,18 +1,20 @@
-//! Weights of rows from the local noise level.
+//! Weighting of rows by the local noise level.
 
 use super::row_pass::{KeptRows, PassError};
 use super::{EstimationSettings, EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
 use serde::{Deserialize, Serialize};
 
-/// Estimation of the local noise level; see [`NoiseLevelSettings`].
+/// Settings for the local noise level; see [`NoiseLevelSettings`].
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseLevels {
-    /// Rows of one joint and log, centred on a row, whose residuals determine its noise level; 51 by default.
+    /// Number of rows of one joint and log, centred on a row, whose residuals determine the noise level of this row; 51
+    /// by default.
     pub window_rows: usize,
-    /// Share of the joint's mean square residual in every level's square, 0 to 1; 1e-3 by default.
+    /// Share of the joint's mean square residual that is mixed into the square of every noise level, 0 to 1; 1e-3 by
+    /// default.
     pub pooled_share: f64,
     /// Maximum number of passes over the logs; 30 by default.
     pub max_passes: usize,

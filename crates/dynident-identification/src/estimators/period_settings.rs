@@ -6,16 +6,17 @@ use thiserror::Error;
 /// Maximum period of a motion, s: eleven days.
 const MAX_PERIOD_S: f64 = 1e6;
 
-/// The repeated motion.
+/// Settings of a repeated motion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PeriodSettings {
     /// Period of the motion, s; by default the length of the log's `reference`.
     pub period_s: Option<f64>,
-    /// Time at the start of every log that is excluded until the motion repeats, s; 0 by default.
+    /// Time that is excluded at the start of every log, before the motion is periodic, s; 0 by default.
     pub skip_s: f64,
-    /// Harmonics of the motion's Fourier series, for the simultaneous fit only; by default those above the noise.
+    /// Number of harmonics in the Fourier series of the motion, for the simultaneous fit only; by default all harmonics
+    /// above the noise.
     pub harmonics: Option<usize>,
 }
 
@@ -27,16 +28,16 @@ pub struct PeriodicFit {
     pub period_s: f64,
     /// Number of averaged periods of each log.
     pub periods: Vec<usize>,
-    /// Instants of all mean periods in the fit.
+    /// Number of instants of all averaged periods in the fit.
     pub instants: usize,
-    /// Standard deviation of a single sample's smoothed position, velocity and acceleration of each joint, rad, rad/s,
-    /// rad/s² (m).
+    /// Standard deviation of the smoothed position, velocity and acceleration of a single sample, for each joint, rad,
+    /// rad/s, rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
-    /// Standard deviation of a single sample's filtered torque of each joint, Nm (N).
+    /// Standard deviation of the filtered torque of a single sample, for each joint, Nm (N).
     pub torque_std: Vec<f64>,
-    /// Cost of the likelihood.
+    /// Cost function of the likelihood at the estimate.
     pub cost: f64,
-    /// Expected cost for correct model and noise.
+    /// Expected cost if model and noise are correct.
     pub degrees_of_freedom: usize,
 }
 

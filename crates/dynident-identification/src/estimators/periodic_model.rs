@@ -1,4 +1,4 @@
-//! Robot model for the simultaneous fit: unknown motion (a Fourier series) and unknown parameters.
+//! Robot model for the simultaneous fit, in which the motion (a Fourier series) and the parameters are unknown.
 
 use core::f64::consts::TAU;
 use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_adjoint};
@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 const BLOCK_SAMPLES: usize = 256;
 
-/// Minimum number of rows per period of the highest harmonic, so that the series hardly changes within a row.
+/// Minimum number of rows per period of the highest harmonic. With fewer, the motion would change too much within a
+/// row.
 const MIN_ROWS_PER_HARMONIC: f64 = 60.0;
 
 /// Recorded positions and torques on a uniform clock without a gap.
@@ -17,13 +18,13 @@ const MIN_ROWS_PER_HARMONIC: f64 = 60.0;
 pub struct PeriodicRecord {
     /// Sample rate, hertz.
     pub rate_hz: f64,
-    /// Positions (rad, m), joint-major, joints in the order of the model.
+    /// Positions (rad, m), joint after joint, in the order of the model.
     pub q: Vec<f64>,
-    /// Torques (N m, N), in the same layout.
+    /// Torques (N m, N), joint after joint, in the order of the model.
     pub tau: Vec<f64>,
 }
 
-/// Basis of a Fourier series: a constant, then sine and cosine of every harmonic.
+/// Basis functions of a Fourier series: a constant, then sine and cosine of every harmonic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FourierSeries {
     /// Period of the first harmonic, s.
@@ -33,7 +34,8 @@ pub struct FourierSeries {
 }
 
 impl FourierSeries {
-    /// Maximum number of successive samples per row: at least sixty rows remain in a period of the highest harmonic.
+    /// Maximum number of successive samples that are averaged to a row, so that at least sixty rows remain in a period
+    /// of the highest harmonic.
     pub fn samples_of_row(&self, rate_hz: f64) -> usize {
         (rate_hz * self.period_s / (MIN_ROWS_PER_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
     }
@@ -42,8 +44,9 @@ impl FourierSeries {
 /// Positions and torques of one record as functions of the joints' Fourier coefficients (constant, then sine and cosine
 /// of every harmonic) and of base parameters.
 ///
-/// A row is the mean of `mean_of` successive samples, which keeps the content below the rate of the rows. Channels are
-/// the positions of the joints, then their torques. Torque terms must depend on the motion of one instant only.
+/// A row is the mean of `mean_of` successive samples, which keeps frequencies far below the rate of the rows. The
+/// channels are the positions of the joints, then their torques. Torque terms must depend only on the motion at the
+/// same instant.
 #[derive(Debug)]
 pub struct PeriodicModel<'a> {
     model: &'a RegressorModel,
@@ -51,17 +54,17 @@ pub struct PeriodicModel<'a> {
     mean_of: usize,
     /// Angular frequency of every harmonic, rad/s.
     omega: Vec<f64>,
-    /// Basis at every sample, (samples, 1 + 2 harmonics).
+    /// Values of the basis functions at every sample, (samples, 1 + 2 harmonics).
     basis: DMatrix<f64>,
-    /// Means of the basis over each row.
+    /// Means of the basis functions over each row.
     row_basis: DMatrix<f64>,
-    /// Means of the positions, (rows, joints).
+    /// Means of the positions over each row, (rows, joints).
     row_q: DMatrix<f64>,
     workspace: BatchWorkspace,
 }
 
 impl<'a> PeriodicModel<'a> {
-    /// Model of a record whose motion is this series.
+    /// Creates the model of a record whose motion is this Fourier series.
     pub fn new(model: &'a RegressorModel, record: &'a PeriodicRecord, series: FourierSeries, mean_of: usize) -> Self {
         let joints = model.dof();
         let samples = record.q.len() / joints.max(1);
@@ -85,7 +88,7 @@ impl<'a> PeriodicModel<'a> {
         }
     }
 
-    /// Rows of each channel.
+    /// Number of rows of each channel.
     pub fn rows(&self) -> usize {
         self.row_basis.nrows()
     }
@@ -98,7 +101,8 @@ impl<'a> PeriodicModel<'a> {
         self.model.dof()
     }
 
-    /// Least-squares coefficients of the positions, by joint; `None` if the record does not determine them.
+    /// Least-squares Fourier coefficients of the positions, joint after joint; `None` if the record does not determine
+    /// them.
     pub fn fitted_motion(&self) -> Option<Vec<f64>> {
         let normal = self.row_basis.tr_mul(&self.row_basis).cholesky()?;
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
@@ -115,7 +119,7 @@ impl<'a> PeriodicModel<'a> {
         rate
     }
 
-    /// Visits the samples in blocks with their motion and regressor.
+    /// Calls `visit` for blocks of samples with their motion and regressor.
     fn walk(&mut self, motion: &[f64], mut visit: impl FnMut(&mut BatchWorkspace, usize, &JointMotion<'_>, &Panels)) {
         let coefficients = DMatrix::from_column_slice(self.own(), self.joints(), motion);
         let rate = self.derivative(&coefficients);
@@ -132,7 +136,7 @@ impl<'a> PeriodicModel<'a> {
         }
     }
 
-    /// Means of the positions minus the series, (rows, joints).
+    /// Means over each row of the positions minus the Fourier series, (rows, joints).
     pub(super) fn position_residuals(&self, motion: &[f64]) -> DMatrix<f64> {
         &self.row_q - &self.row_basis * DMatrix::from_column_slice(self.own(), self.joints(), motion)
     }
@@ -168,7 +172,8 @@ impl SimultaneousModel for PeriodicModel<'_> {
         let rows = self.row_basis.nrows();
         let mut by_parameters: Vec<DMatrix<f64>> =
             (0..joints).map(|_| DMatrix::zeros(rows, parameters.len())).collect();
-        // Derivatives of each torque by positions, velocities and accelerations, means over rows: (rows, 3 joints).
+        // Derivatives of each joint's torque by positions, velocities and accelerations, averaged over each row: (rows,
+        // 3 joints).
         let mut slopes: Vec<DMatrix<f64>> = (0..joints).map(|_| DMatrix::zeros(rows, 3 * joints)).collect();
         let share = 1.0 / mean_of as f64;
         self.walk(motion, |workspace, first, block, panels| {
@@ -231,8 +236,8 @@ impl SimultaneousModel for PeriodicModel<'_> {
 }
 
 impl PeriodicModel<'_> {
-    /// Derivatives of one torque by the coefficients of all joints. The series hardly changes within a row, so the mean
-    /// of slope times basis is approximated by the product of the means.
+    /// Derivatives of one joint's torque by the Fourier coefficients of all joints. The motion hardly changes within a
+    /// row, so the mean of a product (slope times basis function) is approximated by the product of the means.
     fn by_coefficients(&self, slopes: &DMatrix<f64>) -> DMatrix<f64> {
         let (joints, own) = (self.joints(), self.own());
         let mut out = DMatrix::zeros(slopes.nrows(), joints * own);
@@ -252,7 +257,8 @@ impl PeriodicModel<'_> {
     }
 }
 
-/// Several records with separate motions and one set of parameters. Channels and unknowns are ordered by record.
+/// Several records with separate motions and one common set of parameters. Channels and unknowns are ordered record by
+/// record.
 pub(super) struct PeriodicRecords<'a>(pub(super) Vec<PeriodicModel<'a>>);
 
 impl SimultaneousModel for PeriodicRecords<'_> {

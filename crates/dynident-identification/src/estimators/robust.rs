@@ -1,11 +1,11 @@
-//! Iteratively reweighted least squares: outliers get less weight, or none.
+//! Iteratively reweighted least squares, which gives outliers less weight or none.
 
 use super::row_pass::{KeptRows, PassError};
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
 
-/// Weights of the rows in a robust estimator, by joint.
+/// Weights of the rows in a robust estimator, for each joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GrossErrors {

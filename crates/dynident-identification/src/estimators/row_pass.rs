@@ -1,10 +1,10 @@
-//! Repeated passes over the rows of training logs, for estimators that reweight them.
+//! Repeated passes over the rows of training logs, for estimators that change the weights of rows.
 
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
 use dynident_rows::{JointRows, LogError, RowConsumer};
 
-/// Error of the estimator, or of the code that reads or simulates logs for it.
+/// Error of the estimator, or of the code that reads or simulates logs for the estimator.
 pub(crate) enum PassError {
     Estimator(EstimationError),
     Log(EstimatorError),
@@ -16,10 +16,11 @@ impl From<EstimationError> for PassError {
     }
 }
 
-/// Maximum number of values of filtered rows that are kept (256 MiB).
+/// Maximum number of values of filtered rows that are kept in memory (256 MiB).
 const MAX_KEPT_VALUES: usize = 1 << 25;
 
-/// Rows of the training logs for repeated passes; kept if they fit, otherwise computed again in every pass.
+/// Rows of the training logs for repeated passes. They are kept in memory if they fit; otherwise every pass computes
+/// them again.
 pub(super) struct KeptRows {
     blocks: Option<Vec<KeptBlock>>,
     complete: bool,

@@ -6,33 +6,33 @@ use dynident_estimation::{
     CovarianceMethod, EssentialSettings, OrdinarySettings, RankSettings, SegmentSettings, WeightedSettings,
 };
 
-/// Estimator of base parameters, and their error bars.
+/// Settings: estimator of base parameters, and method of its error bars.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct EstimationSettings {
     /// Estimator; weighted least squares by default.
     pub estimator: Estimator,
-    /// Criterion for excited columns.
+    /// Criterion that decides which regressor columns are excited.
     pub rank: RankSettings,
-    /// Method for the covariance of the error bars; jackknife by default.
+    /// Method for the covariance behind the error bars; jackknife by default.
     pub covariance: CovarianceMethod,
-    /// Segments of logs for the covariance.
+    /// Division of the logs into time segments, for the covariance.
     pub segments: SegmentSettings,
-    /// Instruments that only test whether noise in the regressor biases the estimator; none by default.
+    /// Instruments that are only used to test whether noise in the regressor biases the estimator; none by default.
     pub exogeneity_test: Option<InstrumentSettings>,
-    /// Whether noise in the regressor is tested if possible, with instruments from the logs' own motion. It takes one
-    /// more pass over the logs; off by default. [`Estimator::Auto`] always does it.
+    /// Whether to test the effect of noise in the regressor, if possible, with instruments from the logs' own motion.
+    /// The test takes one more pass over the logs; off by default. [`Estimator::Auto`] always makes it.
     pub examine_exogeneity: bool,
-    /// Holds poorly determined parameters at zero; off by default.
+    /// Settings for fixing poorly determined parameters at zero; off by default.
     pub essential: Option<EssentialSettings>,
-    /// Base columns held at given values (column, value); none by default.
+    /// Base parameters that are fixed at given values (column, value); none by default.
     pub held: Vec<(usize, f64)>,
     /// Thresholds of tests.
     pub thresholds: EstimationThresholds,
 }
 
 impl EstimationSettings {
-    /// An estimator with default settings otherwise.
+    /// Settings with this estimator and defaults otherwise.
     pub fn of(estimator: Estimator) -> Self {
         Self { estimator, ..Self::default() }
     }

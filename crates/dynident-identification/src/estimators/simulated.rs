@@ -1,4 +1,4 @@
-//! DIDIM, CLIE and CLOE: estimates from a controller and the commanded motion.
+//! DIDIM, CLIE and CLOE: estimators that simulate the closed loop of controller and robot along the commanded motion.
 
 use super::simulated_loop::{ComparedSignal, LoopLog, SimulatedLoop};
 use super::start_values::start_values;
@@ -12,44 +12,48 @@ use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Run
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Minimum noise relative to the root mean square of the compared signal, so that noise-free data have finite weights.
+/// Minimum noise relative to the root mean square of the compared signal, so that weights are finite for noise-free
+/// data.
 const MIN_RELATIVE_SIGMA: f64 = 1e-4;
 /// Maximum number of matrix entries (rows times columns) in memory, 8 bytes each.
 const MAX_ENTRIES: usize = 100_000_000;
-/// Maximum number of updates of the joints' noise.
+/// Maximum number of updates of the noise estimates of the joints.
 const MAX_ROUNDS: usize = 3;
 const MAX_NOISE_CHANGE: f64 = 0.1;
 
-/// Start of the iteration.
+/// Start values of the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulationStart {
-    /// The one of the two below whose simulation is closer to the record; the other one if that fails.
+    /// [`Estimate`](Self::Estimate) or [`Description`](Self::Description): the start whose simulation is closer to the
+    /// record. If the iteration from this start fails, the other one is used.
     #[default]
     Nearer,
-    /// The consistent set with the best fit to the measured rows; a simulation with negative masses would fail.
+    /// The physically consistent set with the best fit to the measured rows. (A simulation with negative masses would
+    /// fail.)
     Estimate,
-    /// The robot description.
+    /// The values of the robot description.
     Description,
 }
 
-/// The simulated experiment, and settings of the fit.
+/// Settings of the simulated closed loop and of the fit.
 #[derive(Clone, Debug)]
 pub struct SimulatedLoopSettings {
-    /// Controller that drove the robot.
+    /// Controller that was used in the experiment.
     pub controller: ControllerSettings,
     /// Rate of the controller, hertz.
     pub rate_hz: f64,
-    /// Integrator, velocities and delays of the feedback, start and torque limits of the loop. Noise is not simulated.
+    /// Integrator, velocity feedback, feedback delays, start and torque limits of the closed loop. Noise is not
+    /// simulated.
     pub loop_settings: LoopSettings,
-    /// Start of the iteration.
+    /// Start values of the iteration.
     pub start: SimulationStart,
-    /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-3 is usual.
+    /// Length of a step below which the iteration ends, in units of the error bars over all directions; 1e-3 is usual.
     pub tolerance: f64,
     /// Maximum number of steps; 30 are usual.
     pub max_iterations: usize,
-    /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 is usual.
+    /// Step of the finite differences in CLIE and CLOE, relative to the size of each parameter; 1e-4 is usual.
     pub difference: f64,
 }
 
@@ -63,10 +67,10 @@ pub struct SimulatedFit {
     pub rate_hz: f64,
     /// Compared signal: `torque` or `position`.
     pub compared: String,
-    /// Start of the iteration: the `estimate` (the physically consistent set with the best fit to the measured rows) or
-    /// the `description`.
+    /// Start values of the iteration: `estimate` (the physically consistent set with the best fit to the measured rows)
+    /// or `description` (the robot description).
     pub start: String,
-    /// Number of steps.
+    /// Number of steps of the iteration.
     pub iterations: usize,
     /// Number of simulations of all logs.
     pub simulations: usize,
@@ -76,10 +80,10 @@ pub struct SimulatedFit {
 
 /// Computes the estimate.
 ///
-/// The simulation uses the study's controller (a model in it is that of the robot description) and the log's commanded
-/// motion, without noise. Its signals are sampled at the log's instants and pass the same parallel filter as the
-/// measured ones. Error bars are those of weighted least squares on the last linearised rows, so they include
-/// correlated residuals.
+/// The simulation uses the controller of the study (with the robot description, if the controller contains a model) and
+/// the commanded motion of the log, without noise. Its signals are sampled at the instants of the log and pass the same
+/// parallel filter as the measured signals. The error bars are computed by weighted least squares on the last
+/// linearised rows, so they include correlated residuals.
 pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
@@ -121,14 +125,15 @@ pub(super) fn simulated(
     let mut estimate = weighted_least_squares(&linearised(rows, &simulated, &found)?, &weighted)?;
     estimate.iterations = best.iterations;
     if found.status == EstimateStatus::IterationLimit {
-        // The last step made the simulation worse, so keep the last simulated values.
+        // The last step increased the cost, so the last simulated values are kept.
         estimate.status = EstimateStatus::IterationLimit;
         estimate.values.clone_from(&found.values);
         let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
         estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
     }
     let residual_std = std::mem::take(&mut estimate.joint_sigma);
-    // Residual of the measured torque, also if positions were compared, because the error band of the torque uses it.
+    // The residual of the measured torque is used even if positions were compared, because the error band of the torque
+    // needs it.
     estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     let fit = SimulatedFit {
         controller: controller.name().to_owned(),
@@ -142,7 +147,7 @@ pub(super) fn simulated(
     Ok((estimate, fit))
 }
 
-/// The experiment without noise and without limits other than those of the torque.
+/// The closed loop without noise, and without limits other than torque limits.
 fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> LoopSettings {
     let mut settings = experiment.loop_settings.clone();
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
@@ -152,7 +157,7 @@ fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> Lo
     settings
 }
 
-/// The model inside a controller that needs one: the robot description.
+/// Model for a controller that needs one: the robot description.
 fn controller_model(
     rows: &TrainingRows<'_>,
     controller: &ControllerSettings,
@@ -174,8 +179,8 @@ fn controller_model(
     described.map(Some).map_err(|error| wrong(format!("[controller]: {error}")))
 }
 
-/// Iterates from the start whose simulation is closest to the record, and from the others until one converges. Returns
-/// the best result, with the total numbers of iterations and simulations.
+/// Iterates from the start values whose simulation is closest to the record; if this does not converge, from the other
+/// ones. Returns the best result, with the total numbers of iterations and simulations.
 fn best_outcome(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -204,7 +209,7 @@ fn best_outcome(
     Ok(StartOutcome { iterations, simulations, ..best })
 }
 
-/// Starts whose simulation succeeds, the closest to the record first.
+/// Start values whose simulation succeeds, the closest to the record first.
 fn simulated_starts(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -230,7 +235,8 @@ fn simulated_starts(
     Ok(begun)
 }
 
-/// Standard deviation of each joint's residual of the measured filtered torque, `√(RSS_j / (N_j − p/n))`.
+/// Standard deviation of the residual of each joint's measured filtered torque, `√(RSS_j / (N_j − p/n))`: sum of
+/// squared residuals RSS_j, N_j rows, p parameters and n joints.
 pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Vec<f64>, EstimationError> {
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
@@ -260,8 +266,8 @@ fn log_sum(sigma: &[f64]) -> f64 {
     sigma.iter().map(|sigma| sigma.ln()).sum()
 }
 
-/// The fit from one start, with steps until it settles. After each step the residuals of a joint give its noise, and
-/// the rows of the joint are weighted with it.
+/// Fits from one set of start values, with steps until convergence. After each step, the residuals of a joint determine
+/// its noise, which gives the weights of its rows.
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
@@ -315,7 +321,7 @@ fn no_simulation(why: &str) -> String {
     )
 }
 
-/// Standard deviation of each joint's part of `residual`.
+/// Standard deviation of the part of `residual` that belongs to each joint.
 fn deviations(
     simulated: &SimulatedLoop<'_>,
     residual: &DVector<f64>,
@@ -339,20 +345,21 @@ fn deviations(
             let rows = count[joint] as f64;
             let least = MIN_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
             let sigma = (squares[joint] / (rows - share).max(1.0)).sqrt().max(least);
-            // A joint without torque and without residual.
+            // A joint without torque and without residual gets weight 1.
             if sigma > 0.0 { sigma } else { 1.0 }
         })
         .collect()
 }
 
-/// Repeats one value per joint for its rows.
+/// Repeats the value of each joint for all rows of the joint.
 fn by_row(simulated: &SimulatedLoop<'_>, values: &[f64]) -> DVector<f64> {
     let all = simulated.logs.iter().flat_map(|log| log.rows.iter().zip(values));
     let repeated = all.flat_map(|(&rows, &value)| std::iter::repeat_n(value, rows));
     DVector::from_iterator(simulated.rows(), repeated)
 }
 
-/// The last linearised rows `J θ' ≈ residual + J θ`, by log, joint and time segment.
+/// The last linearised rows `J θ' ≈ residual + J θ` (J: derivative of the simulated signals by the parameters θ), by
+/// log, joint and time segment.
 fn linearised(
     training: &TrainingRows<'_>,
     simulated: &SimulatedLoop<'_>,

@@ -1,5 +1,5 @@
-//! Simulation of an experiment's closed loop for the estimators: controller, reference, instants and filters as in the
-//! logs, with other parameters.
+//! Simulation of the closed loop of an experiment for estimators. Controller, reference, instants and filters are those
+//! of the logs; the parameters vary.
 
 use super::row_pass::PassError;
 use super::{EstimatorError, TrainingRows};
@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ComparedSignal {
-    /// Torque, with the regressor of the simulated motion: DIDIM.
+    /// Torque, compared by linear regression with the regressor of the simulated motion (DIDIM).
     TorqueRows,
     Torque,
     Position,
@@ -45,18 +45,18 @@ struct Piece {
     rows: usize,
 }
 
-/// Reference, filter and instants of a log.
+/// Reference, filter and sampling instants of a log.
 pub(super) struct LoopLog {
     pub(super) name: String,
     rate_hz: f64,
     pieces: Vec<Piece>,
     filter: Option<DecimationSettings>,
     reference: Reference,
-    /// Start of the simulation, s after the log's first row: that of the commanded motion, or of the log if it begins
-    /// later.
+    /// Start of the simulation, s after the first row of the log: the start of the commanded motion, or the start of
+    /// the log if it is later.
     begins_s: f64,
     pub(super) rows: Vec<usize>,
-    /// Measured and filtered outputs of each joint.
+    /// Measured and filtered outputs (torques or positions) of each joint.
     measured: Vec<Vec<f64>>,
 }
 
@@ -67,7 +67,7 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) settings: LoopSettings,
     pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
-    /// Wraps a message in an error.
+    /// Converts a message to an error of this estimator.
     pub(super) wrong: &'a dyn Fn(String) -> EstimatorError,
     /// Reason for the last failed simulation.
     pub(super) failure: Option<String>,
@@ -143,7 +143,7 @@ impl LoopLog {
 }
 
 impl SimulatedLoop<'_> {
-    /// Measured outputs, ordered by log, then by joint: the order of all rows.
+    /// Measured outputs, ordered by log, then by joint, as all rows.
     pub(super) fn measured(&self) -> DVector<f64> {
         let all = self.logs.iter().flat_map(|log| log.measured.iter().flatten().copied());
         DVector::from_iterator(self.rows(), all)
@@ -153,8 +153,8 @@ impl SimulatedLoop<'_> {
         self.logs.iter().flat_map(|log| &log.rows).sum()
     }
 
-    /// The robot with base parameters θ. Its torques and mass matrix are those of every full set with these base
-    /// parameters.
+    /// The robot with base parameters θ. Every set of inertial parameters with these base parameters has the same
+    /// torques and mass matrix.
     fn plant(&self, theta: &[f64]) -> Result<Plant, SimulationError> {
         let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)?;
         let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
@@ -270,7 +270,7 @@ struct CollectedRows {
     filled: usize,
 }
 
-/// One value per joint and sample through the parallel filter.
+/// Filters one value per joint and sample with the parallel filter.
 struct Outputs {
     filters: JointFilters,
     segment: usize,
@@ -303,8 +303,8 @@ impl RowConsumer for PanelRows {
     }
 }
 
-/// The motion of a run at any time of the log's clock: quintic interpolation of position, velocity and acceleration
-/// between the controller's samples.
+/// Motion of a simulated run at any time on the log's clock, by quintic interpolation of position, velocity and
+/// acceleration between the samples of the controller.
 fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
     let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
     let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())
@@ -313,7 +313,8 @@ fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, Fi
     dynident_recording::Reference::sampled(&times, &joints)
 }
 
-/// The torque of the controller's last sample; a small offset protects against rounding.
+/// Torque of the last controller sample before `time_s`, which is held until the next one. A small offset of the time
+/// avoids rounding errors.
 fn held_torque(run: &Run, joint: usize, time_s: f64) -> f64 {
     let sample = ((time_s * run.rate_hz).max(0.0) + 1e-6).floor() as usize;
     run.tau[run.of(joint)][sample.min(run.samples - 1)]

@@ -1,5 +1,5 @@
-//! Motion and parameters from one likelihood: logs whose motion is a Fourier series, raw positions and torques, noise
-//! of both.
+//! Simultaneous estimation of motion and parameters from one likelihood. It uses raw positions and torques with noise
+//! in both; the motion is a Fourier series.
 
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
@@ -13,10 +13,10 @@ use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of automatic harmonics; more cost much time.
+/// Maximum number of harmonics that are selected automatically; more harmonics take much time.
 const MAX_HARMONICS: usize = 60;
 
-/// Motion and noise of one log in the simultaneous fit.
+/// Fourier motion and noise of one log, from the simultaneous fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SeriesFit {
@@ -24,15 +24,15 @@ pub struct SeriesFit {
     pub period_s: f64,
     /// Number of harmonics.
     pub harmonics: usize,
-    /// Rows of each channel.
+    /// Number of rows of each channel.
     pub rows: usize,
-    /// Samples per row.
+    /// Number of samples that are averaged to a row.
     pub samples_of_row: usize,
-    /// Standard deviation of a row's position from the series by joint, rad (m).
+    /// Standard deviation of a row's position from the Fourier series, for each joint, rad (m).
     pub position_std: Vec<f64>,
-    /// Standard deviation of a row's torque from the model by joint, N m (N).
+    /// Standard deviation of a row's torque from the model, for each joint, N m (N).
     pub torque_std: Vec<f64>,
-    /// Order of the autoregression of each joint's torque noise; 0 for white noise.
+    /// Order of the autoregressive model of each joint's torque noise; 0 for white noise.
     pub torque_autoregression: Vec<usize>,
 }
 
@@ -89,7 +89,7 @@ pub(super) fn simultaneous(
     Ok((estimate, Findings::Series(fits)))
 }
 
-/// Start values of the motion of all logs, from the positions alone.
+/// Start values for the motion of all logs, from the positions alone.
 fn fitted_motion(
     rows: &TrainingRows<'_>,
     records: &PeriodicRecords<'_>,
@@ -137,7 +137,8 @@ fn series_fits(
     Ok(recorded.iter().enumerate().map(series).collect())
 }
 
-/// Converts an estimate by channel (positions and torques of each log) to one by joint, using the torque channels.
+/// Converts an estimate whose rows are grouped by channel (positions and torques of each log) to one whose rows are
+/// grouped by joint, using the torque channels.
 fn of_joints(
     mut estimate: Estimate,
     problem: &LinearProblem,
@@ -158,7 +159,8 @@ fn of_joints(
     Ok(estimate)
 }
 
-/// Reads log `index` and selects the series of its motion: the stated number of harmonics, or those above the noise.
+/// Reads log `index` and selects the Fourier series of its motion: the stated number of harmonics, or all harmonics
+/// above the noise.
 fn read(
     rows: &TrainingRows<'_>,
     index: usize,
@@ -174,7 +176,7 @@ fn read(
             "log `{name}`: the period of the motion is unknown: set period_s in [estimator.periods], or give the commanded motion of one period as the log's reference"
         )));
     };
-    // Central differences do not change positions.
+    // Central differences leave the positions unchanged.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let Some(mut stream) = recording.open(model.model(), &motion)? else {
@@ -205,7 +207,7 @@ fn read(
             "log `{name}`: {length_s:.2} s remain, less than one period of {period_s} s: record at least one period, or correct period_s"
         )));
     }
-    // The cut-off is twice the highest frequency above the noise.
+    // The suggested cut-off is twice the highest frequency above the noise.
     let highest = (0.5 * stream.cutoff().cutoff_hz * period_s).ceil() as usize;
     let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MAX_HARMONICS));
     if 4.0 * harmonics as f64 > rate_hz * period_s {
@@ -219,7 +221,7 @@ fn read(
     Ok(RawRecord { record, series: FourierSeries { period_s, harmonics } })
 }
 
-/// Checks that the positions are those of the fitted series; otherwise returns the joint and a message.
+/// Checks that the positions agree with the fitted Fourier series; otherwise returns the joint and a message.
 fn check_motion(
     record: &PeriodicModel<'_>,
     fitted: &[f64],

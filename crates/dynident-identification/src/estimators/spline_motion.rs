@@ -1,5 +1,5 @@
-//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion as a
-//! smoothing spline.
+//! Simultaneous estimation of motion and parameters from one likelihood, for any log. It uses raw positions and torques
+//! with noise in both; the motion is a smoothing spline.
 
 use super::simulated::torque_sigma;
 use super::spline_torque::SplineTorque;
@@ -15,19 +15,20 @@ use serde::{Deserialize, Serialize};
 /// Minimum length of a piece between two gaps, samples.
 const MIN_PIECE_SAMPLES: usize = 64;
 
-/// Results of the fit of motion and parameters.
+/// Results of the simultaneous fit of motion and parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineFit {
-    /// Motion and noise of every training log.
+    /// Spline motion and noise of every training log.
     pub logs: Vec<SplineLogFit>,
-    /// Sum of squares with the parameters of weighted least squares, the motion from the positions alone and the
-    /// estimated noise.
+    /// Cost at the start: weighted sum of squared residuals with the parameters of weighted least squares, the motion
+    /// from the positions alone, and the estimated noise.
     pub cost_at_start: f64,
-    /// Final sum of squares.
+    /// Cost at the end: weighted sum of squared residuals.
     pub cost: f64,
-    /// Ratio of filtered residuals to those of weighted least squares, root mean square over the joints. It is slightly
-    /// above one if position noise biases least squares; far above one, model error was treated as noise.
+    /// Ratio of the filtered residuals of this fit to those of weighted least squares, root mean square over the
+    /// joints. If it is slightly above one, position noise biases least squares. If it is far above one, this fit has
+    /// treated model error as noise.
     pub residual_over_start: f64,
 }
 
@@ -94,7 +95,7 @@ pub(super) fn spline_motion(
         }
     }
     let mut estimate = found.estimate;
-    // Channels are torques first; the estimate is reported by joint.
+    // The values for the torque channels come first. The estimate is reported by joint.
     for of_channels in [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
     {
         of_channels.truncate(dof);
@@ -104,7 +105,7 @@ pub(super) fn spline_motion(
     Ok((estimate, Findings::Spline(fit)))
 }
 
-/// Pieces of recording `index`, with measured temperatures if available.
+/// Uninterrupted pieces of recording `index`, with measured temperatures if available.
 fn read(
     rows: &TrainingRows<'_>,
     log: usize,
@@ -114,7 +115,7 @@ fn read(
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
-    // Central differences do not change positions.
+    // Central differences leave the positions unchanged.
     let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
     let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
     let raw = "the positions of a prepared motion are smoothed; give all raw samples";

@@ -1,4 +1,4 @@
-//! Torque of a robot and its derivatives by motion and parameters, for the spline fit.
+//! Torque of a robot and its derivatives by the motion and by the parameters, for the spline fit.
 
 use dynident_dynamics::{
     BatchWorkspace, MotionGradient, Panels, TermHistory, regressor_panels, regressor_panels_adjoint,
@@ -11,14 +11,14 @@ use rayon::prelude::*;
 
 const BLOCK_SAMPLES: usize = 128;
 
-/// Torque and its derivatives, for several blocks of samples in parallel.
+/// Torque and its derivatives by motion and parameters, for several blocks of samples in parallel.
 ///
-/// The derivative of friction with memory, load or temperature by the motion is taken as zero, so that the fit does not
-/// bend the motion for it.
+/// Friction with hysteresis, load dependence or temperature dependence is treated as independent of the motion: its
+/// derivatives are set to zero, so that the fit does not distort the motion because of it.
 #[derive(Debug)]
 pub struct SplineTorque<'a> {
     model: &'a RegressorModel,
-    /// Temperatures of every record, joint-major; empty if not measured.
+    /// Temperatures of every record, joint after joint; empty if not measured.
     temperatures_c: Vec<Vec<f64>>,
     following: Option<(BatchWorkspace, TermHistory)>,
 }
@@ -30,8 +30,8 @@ struct Part {
 }
 
 impl<'a> SplineTorque<'a> {
-    /// Torque of this model; parameters are the columns of its layout. `temperatures_c` of every record, joint-major,
-    /// if friction needs them.
+    /// Torque of this model; its parameters are the columns of the model's layout. `temperatures_c` contains the
+    /// temperatures of every record, joint after joint, if friction needs them.
     pub fn new(model: &'a RegressorModel, temperatures_c: Vec<Vec<f64>>) -> Self {
         let follows = |term: &TorqueTerm| term.has_memory() || term.needs_load() || term.needs_temperature();
         let following = model
@@ -42,7 +42,7 @@ impl<'a> SplineTorque<'a> {
         Self { model, temperatures_c, following }
     }
 
-    /// Panels of all parts in order, if friction has memory.
+    /// Regressor panels of all parts in order, if the model has friction with hysteresis.
     fn following(&mut self, record: usize, first: usize, parts: &[Part]) -> Option<Vec<Panels>> {
         let (workspace, history) = self.following.as_mut()?;
         if first == 0 {
@@ -66,7 +66,7 @@ impl<'a> SplineTorque<'a> {
     }
 }
 
-/// Torque without memory, for several threads.
+/// Torque without hysteresis, which several threads can compute for different samples.
 #[derive(Clone, Copy)]
 struct Instants<'a>(&'a RegressorModel);
 
@@ -100,7 +100,7 @@ impl Instants<'_> {
         torque
     }
 
-    /// Derivatives of joint `joint`'s torque by the motion: positions, velocities, accelerations.
+    /// Derivatives of the torque of joint `joint` by positions, velocities and accelerations.
     fn slopes_of(
         self,
         joint: usize,

@@ -1,16 +1,16 @@
-//! Error of the predicted torque that comes from the motion: the low-pass of the positions, and friction at rest.
+//! Error of the predicted torque that two effects cause: the low-pass of the positions, and friction at rest.
 //!
-//! The low-pass of the differentiator is chosen for the training motion. Motion above its cut-off loses acceleration,
-//! and reversals and pauses are smeared over a period of the cut-off. The prediction from the same positions with a
-//! several times higher cut-off shows the size of this error:
+//! The low-pass of the differentiator is selected for the training motion. Acceleration above its cut-off is lost, and
+//! reversals and pauses are blurred over a period of the cut-off frequency. The torque that is predicted from the same
+//! positions with a several times higher cut-off shows the size of this error d; F is the effect of friction at rest:
 //!
 //! ```text
 //! d = h * (τ̂(q_f) − τ̂(q_kf)),   F = |h| * [|q̇_kf| < v_rest] F(load)
 //! ```
 //!
-//! with the taps h of the parallel filter, positions q_f and q_kf with the cut-offs f and k f, and the largest friction
-//! F(load) of a joint at rest ([`Stiction`]). F is the largest torque that any friction within ±F(load) adds to a
-//! filtered row, so its taps have absolute values.
+//! Here h are the coefficients of the parallel filter (`*` is convolution), q_f and q_kf the positions after low-passes
+//! with the cut-offs f and k f, and F(load) is the largest friction of a joint at rest ([`Stiction`]). F is the largest
+//! torque that any friction within ±F(load) can add to a filtered row, so absolute values of the coefficients are used.
 
 use super::stiction::Stiction;
 use dynident_estimation::SpeedRanges;
@@ -20,29 +20,29 @@ use dynident_rows::{
     motion_band_hz, predicted_torque,
 };
 
-/// Largest cut-off relative to the sample rate.
+/// Maximum cut-off relative to the sample rate.
 const MAX_CUTOFF_OVER_RATE: f64 = 0.4;
 
-/// Rows of one joint from positions with a higher cut-off.
+/// Rows of one joint, computed from positions with a higher cut-off.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FinerRows {
     /// Predicted torque, Nm (N).
     pub(crate) predicted: Vec<f64>,
-    /// Largest torque that friction at rest adds to the row, Nm (N).
+    /// Largest torque that friction at rest can add to the row, Nm (N).
     pub(crate) held: Vec<f64>,
 }
 
-/// Largest filtered friction at rest of one joint in a segment.
+/// Computes the largest torque that friction at rest of one joint can add to the filtered rows of a segment.
 #[derive(Debug, Default)]
 struct HeldBound {
-    /// Samples from `first` on.
+    /// Largest friction at rest for each sample, from sample `first` on.
     samples: Vec<f64>,
     first: usize,
     rows: usize,
 }
 
 impl HeldBound {
-    /// Adds samples; appends every row that they complete to `out`.
+    /// Adds samples, and appends the rows that they complete to `out`.
     fn push(&mut self, samples: impl Iterator<Item = f64>, taps: &[f64], factor: usize, out: &mut Vec<f64>) {
         self.samples.extend(samples);
         while let Some(own) = self.samples.get(self.rows * factor - self.first..).and_then(|own| own.get(..taps.len()))
@@ -78,9 +78,9 @@ struct FinerMotion<'a> {
     rows: Vec<FinerRows>,
 }
 
-/// Rows of every joint of recording `index` with `ratio` times the cut-off of `logs`, aligned with the rows of an
-/// ordinary pass. `None` for differentiators other than zero-phase low-passes, and for a higher cut-off that the sample
-/// rate does not allow.
+/// Rows of every joint of recording `index` with `ratio` times the cut-off of `logs`, at the same instants as the rows
+/// of an ordinary pass. `None` if the differentiator is not a zero-phase low-pass, or if the sample rate does not allow
+/// the higher cut-off.
 pub(crate) fn finer_rows(
     logs: &Logs<'_>,
     model: &RegressorModel,
@@ -96,7 +96,7 @@ pub(crate) fn finer_rows(
         return Ok(None);
     }
     let mut motion = logs.motion.clone();
-    // A causal filter also changes the delay, and other differentiators have no cut-off.
+    // A causal filter would also change the delay, and other differentiators have no cut-off.
     let (DifferentiatorSettings::Butterworth { cutoff_hz, .. }
     | DifferentiatorSettings::FrequencyDomain { cutoff_hz, .. }) = &mut motion.differentiator
     else {

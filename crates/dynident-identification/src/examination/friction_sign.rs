@@ -1,4 +1,4 @@
-//! Negative friction: the sign of a joint's torque, or of its motion, is reversed.
+//! Test for negative friction, which indicates that the sign of a joint's torque or of its motion is reversed.
 //!
 //! The least-squares estimate of the friction of a reversed joint is negative. [`sign_evidence`](super::sign_evidence)
 //! tests all joints together and does not detect a single joint.
@@ -9,27 +9,27 @@ use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
 use dynident_rows::RegressorModel;
 
-/// The mean friction of a joint by the estimate, each term at the root mean square of its column.
+/// Mean friction of a joint in the estimate: each friction term, evaluated at the root mean square of its column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionSign {
     /// The joint.
     pub joint: String,
-    /// `Σ_k θ_k ‖w_k‖ / √N` over the joint's own friction terms, whose columns w_k oppose the motion, Nm (N). It is
-    /// negative if friction would drive the joint.
+    /// Mean friction torque `Σ_k θ_k ‖w_k‖ / √N` over the friction terms of this joint, Nm (N): parameters θ_k, columns
+    /// w_k with the sign of the motion, and N rows. It is negative if friction would drive the joint.
     pub torque: f64,
-    /// Its standard deviation by the covariance of the estimate.
+    /// Standard deviation of this torque, from the covariance of the estimate.
     pub std: f64,
-    /// Residual of the joint, root mean square, Nm (N).
+    /// Root mean square residual of the joint, Nm (N).
     pub left: f64,
 }
 
 impl FrictionSign {
-    /// Whether friction is significantly negative by the default [`ExaminationSettings`].
+    /// Whether the friction is significantly negative, with the thresholds of the default [`ExaminationSettings`].
     pub fn is_reversed(&self) -> bool {
         self.is_reversed_by(&ExaminationSettings::default())
     }
 
-    /// The same by other settings.
+    /// Whether the friction is significantly negative, with the thresholds in `settings`.
     pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
         let ExaminationSettings { min_friction_deviations, min_friction_ratio, .. } = *settings;
         self.std > 0.0
@@ -38,7 +38,7 @@ impl FrictionSign {
     }
 }
 
-/// The mean friction of every joint that has own friction terms, without load-dependent terms, which need a correct
+/// Mean friction of every joint with friction terms. Load-dependent terms are excluded, because they need a correct
 /// load.
 pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate: &Estimate) -> Vec<FrictionSign> {
     let (norms, rows, names) = (problem.column_norms(), problem.joint_rows(), model.joint_names());
@@ -66,8 +66,8 @@ pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate:
     (0..model.dof()).filter_map(of_joint).collect()
 }
 
-/// A sentence for each joint with negative friction; only a warning if no other hypothesis about the logs is better
-/// (`no_other_reading`): then an unmodelled effect is the likelier cause.
+/// A sentence for each joint with negative friction. It is only a warning if no other hypothesis about the logs is
+/// better (`no_other_reading`), because an unmodelled effect is then the more probable cause.
 pub fn friction_sign_findings(signs: &[FrictionSign], no_other_reading: bool) -> impl Iterator<Item = Finding> {
     signs.iter().filter(|sign| sign.is_reversed()).map(move |sign| Finding {
         code: "fit-negative-friction".to_owned(),

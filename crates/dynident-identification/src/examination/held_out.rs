@@ -1,4 +1,4 @@
-//! Test of a model on a recording that was not used for its fit.
+//! Test of a model on a recording that was not used for the fit.
 
 use super::finer_motion::{FinerRows, finer_rows};
 use super::motion_band::MotionBand;
@@ -22,22 +22,23 @@ use serde::{Deserialize, Serialize};
 pub struct LogValidation {
     /// The log.
     pub log: String,
-    /// For the torque in the band of the motion, which does not depend on the cut-off of the fit; in the band of the
-    /// fit if the study states the cut-off.
+    /// Errors for the torque in the frequency band of the motion, which does not depend on the cut-off of the fit. If
+    /// the study states the cut-off, errors in the band of the fit.
     #[serde(flatten)]
     pub model: ValidationReport,
-    /// For the torque in the band of the fit, if that is another band.
+    /// Errors for the torque in the frequency band of the fit, if this is another band.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub in_fit_band: Option<ValidationReport>,
-    /// For the torque as logged.
+    /// Errors for the torque as logged, without a filter.
     pub raw: ValidationReport,
-    /// The physically consistent set for the same torque as `model`.
+    /// Errors of the physically consistent set for the same torque as `model`.
     pub physical: Option<ValidationReport>,
-    /// The nominal model for the same torque.
+    /// Errors of the robot description for the same torque as `model`.
     pub prior: Option<ValidationReport>,
     /// Residual diagnostics of each joint.
     pub residuals: Vec<JointResiduals>,
-    /// Torque offsets of this log, if each log has separate offsets. The errors are those of the rest of the log.
+    /// Torque offsets of this log, if each log has separate offsets. They are estimated from the first part of the log;
+    /// the errors are those of the rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub own_offsets: Option<OwnOffsets>,
     /// Errors without the intervals of clear events; missing without such events.
@@ -49,28 +50,28 @@ pub struct LogValidation {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WithoutEvents {
-    /// Intervals that are left out, s after the first data row of the file.
+    /// Excluded intervals, s after the first data row of the file.
     pub left_out_s: Vec<[f64; 2]>,
-    /// Share of the log's rows that are left out, from 0 to 1.
+    /// Share of the log's rows that are excluded, from 0 to 1.
     pub left_out_share: f64,
-    /// For the same torque as the errors of the complete log.
+    /// Errors for the same torque as those of the complete log.
     pub model: ValidationReport,
-    /// The physically consistent set for the same torque.
+    /// Errors of the physically consistent set for the same torque.
     pub physical: Option<ValidationReport>,
 }
 
-/// A recording that a model was tested on.
+/// Result of testing a model on one recording.
 #[derive(Clone, Debug)]
 pub struct HeldOutExamination {
-    /// Number of the recording.
+    /// Index of the recording.
     pub index: usize,
     /// Errors of the predicted torque.
     pub validation: LogValidation,
-    /// Statistics of reading the recording.
+    /// Statistics from reading the recording.
     pub statistics: LogStatistics,
-    /// Agreement with the nominal values; `None` without any.
+    /// Agreement of the log with the robot description; `None` without nominal values.
     pub nominal_agreement: Option<PriorAgreement>,
-    /// Lag of the torque of each joint; `None` if the log does not determine it.
+    /// Lag of each joint's torque; `None` if the log does not determine it.
     pub delays: Vec<Option<TorqueLag>>,
     /// Measured and predicted torque over time, if requested.
     pub trace: Option<LogTrace>,
@@ -86,18 +87,18 @@ struct HeldOutTest<'a> {
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
-    /// One for each joint; `None` without nominal values.
+    /// Agreement with the nominal values for each joint; `None` without nominal values.
     agreement: Option<Vec<AgreementAccumulator<'a>>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
     counted: Vec<f64>,
-    /// Rows of each joint with a higher cut-off, and the number of rows before the current ones.
+    /// Rows of each joint with a higher cut-off, and the number of rows already processed.
     finer: Option<Vec<(FinerRows, usize)>>,
 }
 
 impl HeldOutTest<'_> {
-    /// Adds errors and residuals of used rows.
+    /// Adds the errors and residuals of the used rows.
     fn add_errors(&mut self, rows: &JointRows<'_>, finer: &[[f64; 2]]) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
@@ -115,7 +116,8 @@ impl HeldOutTest<'_> {
         Ok(())
     }
 
-    /// Prediction with the higher cut-off and friction at rest, of every valid row; empty if unknown.
+    /// For every valid row, the prediction with the higher cut-off and the largest torque of friction at rest; empty if
+    /// unknown.
     fn finer_of(&mut self, rows: &JointRows<'_>) -> Vec<[f64; 2]> {
         let Some((finer, from)) = self.finer.as_mut().and_then(|joints| joints.get_mut(rows.joint)) else {
             return Vec::new();
@@ -139,7 +141,7 @@ impl RowConsumer for HeldOutTest<'_> {
         let added = self.add_errors(&rows.counted(&mut counted), &finer);
         self.counted = counted;
         added?;
-        // The trace also needs the unused rows.
+        // The plot of the torque also needs rows that the errors do not use.
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
@@ -152,7 +154,7 @@ impl RowConsumer for HeldOutTest<'_> {
             let columns = self.rows_of.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
-            // Rows with extrapolated motion or rejected torque are left out.
+            // Rows with extrapolated motion or rejected torque are excluded.
             let measured = &panel[columns.len() * rows..];
             let set_aside = samples.set_aside.get(joint);
             let counts = |row: &usize| set_aside.is_none_or(|set_aside| !set_aside[*row]);
@@ -178,16 +180,16 @@ pub struct ModelUnderTest<'a> {
     pub theta: &'a [f64],
     /// Base parameters of the physically consistent set.
     pub physical: Option<&'a [f64]>,
-    /// Uncertainty for the band of the predicted torque.
+    /// Uncertainty from which the 95 % band of the predicted torque is computed.
     pub uncertainty: Option<&'a Uncertainty>,
-    /// Whether to keep the torque over time, predicted by the physically consistent set if given.
+    /// Whether to store the torque over time. The prediction uses the physically consistent set, if given.
     pub traced: bool,
-    /// Share of the recording, from its start, that determines its own torque offsets, from 0 to 1; the rest is the
-    /// test. `None` for the offsets of the model.
+    /// Share of the recording, from its start, that determines separate torque offsets of this recording, from 0 to 1;
+    /// the rest is the test. `None` to use the offsets of the model.
     pub offset_share: Option<f64>,
 }
 
-/// Tests base parameters, and those of the consistent set, on recording number `index`.
+/// Tests base parameters, and the base parameters of the physically consistent set, on the recording with this index.
 ///
 /// # Errors
 /// An unreadable recording.
@@ -204,7 +206,7 @@ pub fn examine_held_out(
     found
 }
 
-/// [`examine_held_out`] as a part of a stage; `alone` allows a second thread for reading.
+/// [`examine_held_out`] as a part of a larger job; `alone` allows a second thread for reading.
 pub(crate) fn tested_on(
     logs: &Logs<'_>,
     (settings, limits): (&EstimationSettings, &ExaminationSettings),
@@ -220,7 +222,7 @@ pub(crate) fn tested_on(
     let ModelUnderTest { theta, physical, uncertainty, traced, .. } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let nominal = model.parametric.nominal_base();
-    // The motion band needs the samples of a log.
+    // Errors in the frequency band of the motion require the samples of a log.
     let is_whole = matches!(recording.samples, Samples::Log(_));
     let sets = [Some(theta), physical, nominal].into_iter().flatten().collect();
     let finer = if is_whole { finer_rows(logs, model, theta, index, limits.finer_cutoff_ratio)? } else { None };
@@ -280,7 +282,7 @@ pub(crate) fn tested_on(
     })
 }
 
-/// [`tested_on`] with the offsets of the recording from its first `share`, on the rest.
+/// As [`tested_on`], but the first `share` of the recording determines its offsets, and the rest is the test.
 fn tested_on_rest(
     logs: &Logs<'_>,
     limits: (&EstimationSettings, &ExaminationSettings),

@@ -1,4 +1,4 @@
-//! Prediction errors in the band of the motion, which do not depend on the cut-off of the fit.
+//! Prediction errors in the frequency band of the motion, which do not depend on the cut-off of the fit.
 
 use dynident_estimation::{Validation, ValidationReport};
 use dynident_recording::{DecimationSettings, FilterError};
@@ -6,8 +6,8 @@ use dynident_rows::{
     JointFilters, LogError, Logs, ParallelFilterSettings, RawSamples, RegressorModel, predicted_torque,
 };
 
-/// Measured torque and the torque of several sets of base parameters after a low-pass for the band of the motion. In
-/// the band of the fit, a lower cut-off would reduce the errors.
+/// Measured torque, and predicted torque for several sets of base parameters, after a low-pass for the frequency band
+/// of the motion. (In the band of the fit, a lower cut-off of the fit would reduce the errors.)
 pub(crate) struct MotionBand<'a> {
     model: &'a RegressorModel,
     sets: Vec<&'a [f64]>,
@@ -20,7 +20,7 @@ pub(crate) struct MotionBand<'a> {
 }
 
 impl<'a> MotionBand<'a> {
-    /// For these sets of base parameters; `None` if the fit has the band of the motion.
+    /// Creates the comparison for these sets of base parameters; `None` if the band of the fit is that of the motion.
     pub(crate) fn of(logs: &Logs<'_>, model: &'a RegressorModel, sets: Vec<&'a [f64]>) -> Option<Self> {
         let motion_hz = logs.motion_hz()?;
         let validations = sets.iter().map(|_| Validation::new(model.joint_names())).collect();
@@ -28,7 +28,7 @@ impl<'a> MotionBand<'a> {
         Some(Self { model, sets, validations, motion_hz, filter: None, panel, predicted, counted })
     }
 
-    /// Takes samples before the parallel filter.
+    /// Adds samples before the parallel filter.
     pub(crate) fn raw(&mut self, log: &str, samples: &RawSamples<'_>) -> Result<(), LogError> {
         let in_filter = |source| LogError::Filter { log: log.to_owned(), source };
         let rate_bits = samples.rate_hz.to_bits();
@@ -74,7 +74,7 @@ impl<'a> MotionBand<'a> {
         JointFilters::new(&vec![1 + self.sets.len(); self.model.dof()], rate_hz, Some(&filter))
     }
 
-    /// One report for each set; `None` without rows.
+    /// One report for each set of base parameters; `None` without rows.
     pub(crate) fn reports(self) -> Option<Vec<ValidationReport>> {
         let reports: Vec<ValidationReport> = self.validations.iter().map(Validation::report).collect();
         reports.iter().all(|report| report.samples > 0).then_some(reports)

@@ -1,23 +1,23 @@
-//! Positions and torque of a log at a low rate, for playing its motion.
+//! Positions and torque of a log at a low rate, for an animation of its motion.
 
 use dynident_rows::{RawSamples, RegressorModel, predicted_torque};
 
-/// Samples per second: a picture with linear interpolation between them looks continuous.
+/// Samples per second: an animation with linear interpolation between them looks continuous.
 const RATE_HZ: f64 = 25.0;
 
-/// Longest time, s; more would make a page larger without showing other motion.
+/// Maximum time, s; more would increase the size of the page without showing other motion.
 const MAX_TIME_S: f64 = 60.0;
 
-/// Positions and torque of a log's first minute, 25 samples per second.
+/// Positions and torque of the first minute of a log, 25 samples per second.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionTrace {
     /// Time of each sample from the start of the log, without gaps, s.
     pub times_s: Vec<f64>,
     /// Positions by joint and sample, rad (m).
     pub q: Vec<Vec<f64>>,
-    /// Measured torque by joint, mean around each sample, Nm (N).
+    /// Measured torque by joint, averaged around each sample, Nm (N).
     pub measured_nm: Vec<Vec<f64>>,
-    /// Predicted torque by joint, mean around each sample, Nm (N).
+    /// Predicted torque by joint, averaged around each sample, Nm (N).
     pub predicted_nm: Vec<Vec<f64>>,
 }
 
@@ -27,7 +27,7 @@ impl MotionTrace {
         Self { times_s: Vec::new(), q: lists(), measured_nm: lists(), predicted_nm: lists() }
     }
 
-    /// Adds the settled samples of a block.
+    /// Adds the samples of a block that are free of end effects of the differentiator.
     pub(super) fn add(
         &mut self,
         model: &RegressorModel,

@@ -1,6 +1,7 @@
-//! Agreement of a log with the nominal model: residual and sign of the torque.
+//! Agreement of a log with the robot description (nominal model): residual and sign of the torque.
 //!
-//! Least squares fits either sign equally well, since all parameters change sign; a nominal model determines the sign.
+//! Least squares fits a reversed torque equally well, because all parameters can change their signs. Only a nominal
+//! model determines the sign.
 
 use crate::examination_settings::ExaminationSettings;
 use dynident_dynamics::Column;
@@ -13,21 +14,23 @@ use dynident_rows::{JointRows, RegressorModel, predicted_torque};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Residual of the nominal model for the torque as given and with the opposite sign.
+/// Residual of the nominal model for the torque as logged and for the torque with the opposite sign.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PriorAgreement {
-    /// `100 ‖τ - τ_prior‖ / ‖τ‖`, all joints stacked.
+    /// Residual for the torque τ as logged, `100 ‖τ - τ_prior‖ / ‖τ‖`, where τ_prior is the torque of the nominal
+    /// model; all joints stacked.
     pub residual_percent: Option<f64>,
-    /// `100 ‖-τ - τ_prior‖ / ‖τ‖`, all joints stacked.
+    /// Residual for the torque with the opposite sign, `100 ‖-τ - τ_prior‖ / ‖τ‖`; all joints stacked.
     pub residual_percent_if_reversed: Option<f64>,
-    /// Joints whose torque fits far better with the opposite sign, each with fitted friction and offset.
+    /// Joints whose torque agrees far better with the nominal model if its sign is reversed. Friction and offset are
+    /// fitted for both signs.
     pub reversed_joints: Vec<String>,
 }
 
 impl PriorAgreement {
-    /// Whether the torque of all joints, or of one joint, fits far better with the opposite sign; `reversed_joints` has
-    /// the settings of the examination.
+    /// Whether the torque of all joints, or of one joint, agrees far better with the opposite sign. (The settings of
+    /// the examination were used for `reversed_joints`.)
     pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
         self.is_whole_reversed(settings) || !self.reversed_joints.is_empty()
     }
@@ -43,17 +46,19 @@ impl PriorAgreement {
     }
 }
 
-/// Squares of one joint's torque and of its residuals by the nominal values, for the given and the opposite sign.
+/// Sum of squares of one joint's torque, and of its residuals with the nominal values, for the torque as logged and
+/// with the opposite sign.
 #[derive(Clone, Copy, Default)]
 struct JointAgreement {
     torque: f64,
     left: [f64; 2],
-    /// Residuals with fitted friction.
+    /// Residuals with fitted friction and offset.
     left_with_friction: [f64; 2],
 }
 
 impl JointAgreement {
-    /// For the rows of a factor, with the nominal values of its columns; those in `friction` are also fitted.
+    /// Computes the agreement from the rows of a triangular factor, with the nominal values of its columns. The columns
+    /// in `friction` are also fitted.
     fn of(factor: &TriangularFactor, nominal: &[f64], friction: &OwnFriction) -> Self {
         let size = factor.columns() + 1;
         let column = |column: usize| DVector::from_fn(size, |row, _| factor.entry(row, column));
@@ -74,15 +79,16 @@ impl JointAgreement {
         Self { torque: torque.norm_squared(), left: squares, left_with_friction }
     }
 
-    /// Whether the torque fits far better with the opposite sign, with fitted friction for both signs: in a few seconds
-    /// of one direction friction may compensate the bodies, but it never drives the joint.
+    /// Whether the torque agrees far better with the opposite sign. Friction is fitted for both signs, but it must not
+    /// drive the joint. (In a few seconds of motion in one direction, friction could otherwise compensate for the
+    /// bodies.)
     fn is_reversed(&self, settings: &ExaminationSettings) -> bool {
         let [given, other] = self.left_with_friction;
         other < settings.max_reversed_ratio * settings.max_reversed_ratio * given
     }
 }
 
-/// The columns of a joint's own friction and offset.
+/// Columns of friction and offset that belong to one joint.
 struct OwnFriction {
     columns: Vec<usize>,
     is_nonnegative: Vec<bool>,
@@ -106,7 +112,7 @@ pub(crate) struct AgreementAccumulator<'a> {
     columns: &'a [usize],
     nominal: &'a [f64],
     friction: OwnFriction,
-    /// The columns are friction, predicted torque, measured torque.
+    /// Triangular factor of the columns friction, predicted torque and measured torque.
     factor: TriangularFactor,
     workspace: FactorWorkspace,
     predicted: Vec<f64>,
@@ -114,7 +120,7 @@ pub(crate) struct AgreementAccumulator<'a> {
 }
 
 impl<'a> AgreementAccumulator<'a> {
-    /// `nominal` has the nominal values of all columns of the model.
+    /// Creates an accumulator; `nominal` contains the nominal values of all columns of the model.
     pub(crate) fn new(model: &'a RegressorModel, joint: usize, nominal: &'a [f64]) -> Self {
         let friction = OwnFriction::of(model, joint);
         let factor = TriangularFactor::new(friction.columns.len() + 1);
@@ -146,7 +152,7 @@ impl<'a> AgreementAccumulator<'a> {
 }
 
 impl PriorAgreement {
-    /// For accumulated rows, one for each joint.
+    /// Agreement from accumulated rows, one accumulator for each joint.
     pub(crate) fn of_rows(
         model: &RegressorModel,
         joints: &[AgreementAccumulator<'_>],
@@ -155,7 +161,7 @@ impl PriorAgreement {
         Self::of_joints(model, joints.iter().map(AgreementAccumulator::agreement), settings)
     }
 
-    /// For the factors of all columns, one for each joint, with the nominal values of the columns.
+    /// Agreement from triangular factors of all columns, one for each joint, with the nominal values of the columns.
     pub(crate) fn of_factors(
         model: &RegressorModel,
         factors: &[SegmentedFactor],
@@ -188,7 +194,7 @@ impl PriorAgreement {
     }
 }
 
-/// The agreement as sentences.
+/// Findings about the agreement, in sentences.
 pub fn agreement_findings(agreement: &PriorAgreement) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut add = |code: &str, level, channel: String, message| {

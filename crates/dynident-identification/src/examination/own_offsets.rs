@@ -1,13 +1,14 @@
 //! Torque offsets of a held-out recording, estimated on its first part.
 //!
-//! If each training log has separate offsets, no training log contains those of a held-out log. With the other
-//! parameters fixed, the least-squares estimate of a joint's offset is the mean residual of the first part:
+//! If each training log has separate offsets, the training logs do not determine the offsets of a held-out log. With
+//! all other parameters fixed, the least-squares estimate of a joint's offset is the mean residual of the first part:
 //!
 //! ```text
 //! δ = mean(τ − τ̂),   std(δ)² = var(means of B blocks)/B
 //! ```
 //!
-//! The rest of the recording is the test. The blocks contain the correlation of the residuals.
+//! The rest of the recording is the test. The standard deviation is computed from the means of blocks, so it includes
+//! the correlation of the residuals.
 
 use super::torque_trace::{JointTrace, LogTrace, TraceConsumer};
 use crate::payload::base_column;
@@ -18,15 +19,15 @@ use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, Recording, R
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Number of blocks of the first part, for the standard deviation of an offset.
+/// Number of blocks in the first part, for the standard deviation of an offset.
 const OFFSET_BLOCKS: usize = 8;
 
-/// Torque offsets of a held-out recording relative to those of the model. They were estimated on the first part of the
-/// recording; the errors are those of the rest.
+/// Torque offsets of a held-out recording relative to the offsets of the model. They are estimated from the first part
+/// of the recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct OwnOffsets {
-    /// The first part, s after the first data row of the file.
+    /// Start and end of the first part, s after the first data row of the file.
     pub fitted_s: [f64; 2],
     /// The joints that have an offset.
     pub joints: Vec<OwnOffset>,
@@ -38,16 +39,16 @@ pub struct OwnOffsets {
 pub struct OwnOffset {
     /// The joint.
     pub name: String,
-    /// Offset minus that of the model, Nm (N).
+    /// Offset of this recording minus the offset of the model, Nm (N).
     pub change_nm: f64,
     /// Standard deviation of the change, Nm (N).
     pub std_nm: f64,
 }
 
-/// Changes of the offsets, by the numbers of the joints.
+/// Changes of the offsets, with the indices of the joints.
 pub(super) struct FittedOffsets {
     pub(super) fitted_s: [f64; 2],
-    /// Joint, change and its standard deviation.
+    /// For each joint its index, the change of the offset, and the standard deviation of the change.
     changes: Vec<(usize, f64, f64)>,
 }
 
@@ -67,8 +68,8 @@ impl RowConsumer for AllResiduals<'_> {
 }
 
 impl FittedOffsets {
-    /// Estimates the offsets on the first `share` of recording `index` (in time) with each of the base parameters
-    /// `sets`, whose residuals have different means; `None` for a prepared motion, and without offsets or rows.
+    /// Estimates the offsets from the first `share` of recording `index` (in time), for each of the base parameter sets
+    /// in `sets`; their residuals have different means. `None` for a prepared motion, and without offsets or rows.
     pub(super) fn of(
         logs: &Logs<'_>,
         model: &RegressorModel,
@@ -104,7 +105,7 @@ impl FittedOffsets {
         Some(Self { fitted_s: [first, end], changes: joints.iter().filter_map(of_joint).collect() })
     }
 
-    /// Base parameters with the offsets of this recording.
+    /// The base parameters `theta` with the offsets of this recording.
     pub(super) fn applied(&self, model: &RegressorModel, theta: &[f64]) -> Vec<f64> {
         let mut values = theta.to_vec();
         for &(joint, change, _) in &self.changes {
@@ -115,7 +116,7 @@ impl FittedOffsets {
         values
     }
 
-    /// Covariance of the base parameters with that of the offsets' changes.
+    /// Covariance of the base parameters, including that of the changed offsets.
     pub(super) fn covariance(&self, model: &RegressorModel, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         let mut sum = covariance.clone();
         for &(joint, _, std) in &self.changes {
@@ -127,7 +128,7 @@ impl FittedOffsets {
         sum
     }
 
-    /// The recordings without the torque of the first part of recording `index`.
+    /// The recordings, with the torque in the first part of recording `index` excluded.
     pub(super) fn rest(&self, recordings: &[Recording], index: usize) -> Vec<Recording> {
         let mut rest = recordings.to_vec();
         if let Samples::Log(log) = &mut rest[index].samples {
@@ -147,7 +148,8 @@ impl FittedOffsets {
     }
 }
 
-/// Mean, and its standard deviation from the means of [`OFFSET_BLOCKS`] blocks; `None` with fewer values than blocks.
+/// Mean of the values, and its standard deviation from the means of [`OFFSET_BLOCKS`] blocks; `None` if there are fewer
+/// values than blocks.
 fn mean_and_std(values: &[f64]) -> Option<(f64, f64)> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     if values.len() < OFFSET_BLOCKS {
@@ -159,7 +161,7 @@ fn mean_and_std(values: &[f64]) -> Option<(f64, f64)> {
     Some((all, (squares / (blocks - 1.0) / blocks).sqrt()))
 }
 
-/// Effect of a joint's offset on the base parameters.
+/// Change of the base parameters per unit of a joint's offset.
 fn offset_column(model: &RegressorModel, joint: usize, rows: usize) -> Option<Vec<f64>> {
     let offset = Column::Term(TorqueTerm::Offset(Offset { joint }));
     let place = model.base().all_columns().iter().position(|column| *column == offset)?;

@@ -1,16 +1,16 @@
-//! Torque that is a function of a joint's position and that the study does not state: a spring, a counterbalance, a
-//! cable.
+//! Search for torque that depends on a joint's position and that the study does not state: a spring, a counterbalance,
+//! a cable.
 //!
-//! The torque of each joint is fitted by all columns w of its rows, by further friction laws and an inertia, and by
-//! piecewise linear functions h over the range of its position:
+//! The torque of each joint is fitted by three groups of columns: all columns w of its rows, columns l of further
+//! friction laws and an inertia, and piecewise linear functions h of its position:
 //!
 //! ```text
 //! min over θ, φ, f of  Σ (τ − w θ − l φ − h f)² + λ ‖f‖²
 //! ```
 //!
-//! λ is small. It moves what both explain, for example a weight, to the other columns. The function is named if the
-//! residual without h is clearly larger: friction that no law of the study has, or errors of other parameters, are
-//! explained by w and l and do not look like a spring.
+//! The weight λ is small. Because of it, torque that both groups can explain, for example of a weight, is attributed to
+//! w and l. The function is reported if the residual without h is clearly larger. Friction that no law of the study
+//! contains, and errors of other parameters, are explained by w and l, so they do not look like a spring.
 
 use crate::examination_settings::ExaminationSettings;
 use crate::friction::{FURTHER_LAWS, FurtherLaws};
@@ -19,26 +19,28 @@ use dynident_recording::{Finding, Level};
 use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, RegressorModel, RowConsumer, Silent};
 use nalgebra::{DMatrix, DVector};
 
-/// Number of pieces of the function.
+/// Number of linear pieces of the function.
 const PIECES: usize = 12;
 
-/// λ relative to the mean square of the functions.
+/// Weight λ relative to the mean square of the functions h.
 const RIDGE: f64 = 1e-3;
 
-/// Smallest weight of a column relative to its own square, so that dependent columns do no harm.
+/// Regularisation of the other columns relative to their own squares, so that dependent columns do no harm.
 const MIN_PIVOT: f64 = 1e-10;
 
-/// Samples per second: many more than a joint has positions in that time.
+/// Number of samples per second that are used; the position of a joint changes little between them.
 const RATE_HZ: f64 = 50.0;
 
-/// Extension beyond the limits of the joint, relative to the range of the logs, so that rounded positions stay inside.
+/// Extension of the function's range beyond the limits of the joint, relative to the range in the logs, so that rounded
+/// positions remain inside.
 const MARGIN: f64 = 0.1;
 
-/// Velocity relative to the root mean square velocity of the joint below which a sample is left out: friction at rest
-/// can have any value up to that in motion, and rests at few positions look like a function of the position.
+/// Velocity below which a sample is excluded, relative to the root mean square velocity of the joint. Friction at rest
+/// can have any value up to the friction in motion, so rests at few positions would look like a function of the
+/// position.
 const REST_SHARE: f64 = 0.05;
 
-/// Least number of samples per unknown.
+/// Minimum number of samples per unknown.
 const MIN_SAMPLES: usize = 5;
 
 /// Unexplained torque of one joint as a function of its position.
@@ -48,16 +50,17 @@ pub struct PositionTorque {
     pub name: String,
     /// Root mean square of the joint's torque that only the function explains, Nm (N).
     pub rms_nm: f64,
-    /// Unexplained torque with the function, relative to that without it.
+    /// Ratio of the unexplained torque with this function to that without it.
     pub left: f64,
     /// Root mean square of the measured torque, Nm (N).
     pub torque_nm: f64,
-    /// Position, rad (m), and torque, Nm (N), in ascending order. The ends are beyond the limits of the joint.
+    /// Points of the function: position, rad (m), and torque, Nm (N), with ascending positions. The ends are beyond the
+    /// limits of the joint.
     pub points: Vec<[f64; 2]>,
 }
 
 impl PositionTorque {
-    /// The keys of a `[[torque]]` with this function.
+    /// Keys of a `[[torque]]` table for the study that describes this function.
     pub fn keys(&self) -> [String; 3] {
         let points: Vec<String> = self.points.iter().map(|[q, torque]| format!("[{q:.3}, {torque:.4}]")).collect();
         [
@@ -89,8 +92,8 @@ pub fn position_torque_findings(found: &[PositionTorque]) -> impl Iterator<Item 
     })
 }
 
-/// Joints whose torque in the training logs `chosen` needs a function of their position. All logs together give at
-/// most as many samples as the lag of one log uses.
+/// Finds joints whose torque in the training logs `chosen` contains an unexplained function of the joint position. The
+/// number of samples of all logs together is limited to the number that the estimation of one log's lag uses.
 ///
 /// # Errors
 /// An unreadable recording.
@@ -114,7 +117,7 @@ pub fn position_torques(
     Ok((0..model.dof()).filter_map(joint).collect())
 }
 
-/// Samples of one joint: its columns followed by its torque, row by row, and its motion.
+/// Samples of one joint: regressor columns followed by the torque, row by row, and the motion.
 #[derive(Default)]
 struct JointSamples {
     rows: Vec<f64>,
@@ -153,7 +156,8 @@ impl RowConsumer for AllJoints<'_> {
     }
 }
 
-/// Normal equations of one joint: columns of the model, further laws and an inertia, functions of the position.
+/// Normal equations of one joint: columns of the model, of further friction laws and an inertia, and of the functions
+/// of the position.
 struct JointFit<'a> {
     model: &'a RegressorModel,
     joint: usize,
@@ -165,7 +169,7 @@ struct JointFit<'a> {
 }
 
 impl<'a> JointFit<'a> {
-    /// `None` without motion or with too few samples.
+    /// Computes the normal equations; `None` without motion or with too few samples.
     fn new(model: &'a RegressorModel, joint: usize, parts: &[&JointSamples]) -> Option<Self> {
         let columns = model.layout().joint_columns(joint).len();
         let others = columns + FURTHER_LAWS + 1;
@@ -211,7 +215,7 @@ impl<'a> JointFit<'a> {
         Some(fit)
     }
 
-    /// Number of the piece at a position, and the position in it from 0 to 1.
+    /// Index of the linear piece at a position, and the relative position within the piece from 0 to 1.
     fn piece(&self, q: f64) -> (usize, f64) {
         let [from, to] = self.range;
         let place = ((q - from) / (to - from) * PIECES as f64).clamp(0.0, PIECES as f64);
@@ -237,7 +241,7 @@ impl<'a> JointFit<'a> {
         Some(PositionTorque { name, rms_nm, left, torque_nm, points: self.points(&centred) })
     }
 
-    /// Values of the first `count` unknowns, and the sum of the squared residuals; `None` for singular equations.
+    /// Values of the first `count` unknowns and the sum of the squared residuals; `None` for singular equations.
     fn solved(&self, count: usize) -> Option<(DVector<f64>, f64)> {
         let others = self.right.len() - PIECES - 1;
         let mut gram = self.gram.view((0, 0), (count, count)).into_owned();
@@ -253,12 +257,12 @@ impl<'a> JointFit<'a> {
         let scaled = DMatrix::from_fn(count, count, |i, k| scale[i] * gram[(i, k)] * scale[k]);
         let values = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
         let explained = 2.0 * values.dot(&right) - values.dot(&(self.gram.view((0, 0), (count, count)) * &values));
-        // Rounding of a sum of squares.
+        // A sum of squares cannot be smaller than its rounding error.
         Some((values, (self.squares - explained).max(1e-12 * self.squares)))
     }
 
-    /// Points at the ends of all pieces. The first and the last piece continue for their length beyond the logs; from
-    /// there to the limits of the joint the torque is constant.
+    /// Points of the function at the ends of all pieces. The first and the last piece are extended by their own length
+    /// beyond the positions in the logs; from there to the limits of the joint, the torque is constant.
     fn points(&self, values: &[f64]) -> Vec<[f64; 2]> {
         let ([from, to], limits) = (self.range, self.model.model().joints()[self.joint].limits);
         let length = (to - from) / PIECES as f64;

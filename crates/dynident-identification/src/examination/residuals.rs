@@ -21,22 +21,27 @@ pub struct JointResiduals {
     pub whiteness: Option<WhitenessReport>,
     /// Jarque-Bera test; `None` for a short log.
     pub normality: Option<NormalityReport>,
-    /// Residual by velocity; `None` if the model has no viscous friction, so that the rows do not contain the velocity.
+    /// Residual for several ranges of velocity; `None` if the model has no viscous friction, because the rows then do
+    /// not contain the velocity.
     pub regimes: Option<SpeedRangesReport>,
-    /// Root mean square of the residual that neither friction at rest nor the low-pass of the positions explains, Nm
-    /// (N): of `|r| − |d| − F` where it is positive, with d and F as in [`TorqueBand`]. `None` without rows.
+    /// Root mean square residual that neither friction at rest nor the low-pass of the positions explains, Nm (N): of
+    /// `|r| − |d| − F` where this is positive, with the residual r, and d and F as in [`TorqueBand`]. `None` without
+    /// rows.
     #[serde(default)]
     pub rmse_in_motion_nm: Option<f64>,
-    /// The 95 % band of the predicted torque; `None` without a covariance. Written as `torque_band` of a result, since
-    /// the test of an existing model has no band.
+    /// The 95 % band of the predicted torque; `None` without a covariance. It is written as `torque_band` of a result
+    /// and not here, because the test of an existing model has no band.
     #[serde(skip)]
     pub band: Option<TorqueBand>,
 }
 
-/// Coverage of the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + |d| + F)` for the torque of one joint on a held-out
-/// log. d is the change of the prediction if the cut-off of the differentiator is four times as high: motion above the
-/// cut-off, and the smearing of reversals and pauses. F is the largest torque that friction at rest adds to the
-/// filtered row (speed below 0.005 rad/s for an arm of usual size), and zero in motion. Without a cut-off d is zero.
+/// Coverage of the predicted 95 % band for the torque of one joint on a held-out log. The band is
+/// `τ̂ ± (t κ √(w V wᵀ + σ²) + |d| + F)`: predicted torque τ̂, row w of the regressor, covariance V of the parameters,
+/// noise σ of the joint, quantile t of Student's distribution, and a factor κ from blocks of the training logs that
+/// were left out of the fit. d is the change of the prediction if the cut-off of the differentiator is four times as
+/// high; it accounts for motion above the cut-off and for blurred reversals and pauses. Without a cut-off, d is zero. F
+/// is the largest torque that friction at rest adds to the filtered row (speed below 0.005 rad/s for an arm of usual
+/// size); it is zero in motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
@@ -44,24 +49,24 @@ pub struct TorqueBand {
     pub log: String,
     /// The joint.
     pub joint: String,
-    /// Share of the filtered torque inside, percent.
+    /// Share of the filtered torque inside the band, percent.
     pub coverage_percent: f64,
-    /// Its mean half width, Nm (N).
+    /// Mean half-width of the band, Nm (N).
     pub half_width_nm: f64,
 }
 
-/// Uncertainty of an estimate, for the band.
+/// Uncertainty of an estimate, from which the band of the predicted torque is computed.
 #[derive(Clone, Debug)]
 pub struct Uncertainty {
     covariance: DMatrix<f64>,
     joint_sigma: Vec<f64>,
-    /// [`left_out_ratios`](dynident_estimation::left_out_ratios).
+    /// Factors on the band of each joint; see [`left_out_ratios`](dynident_estimation::left_out_ratios).
     ratios: Vec<f64>,
     width: f64,
 }
 
 impl Uncertainty {
-    /// The same with another covariance.
+    /// The same uncertainty with another covariance.
     pub(crate) fn with_covariance(&self, covariance: DMatrix<f64>) -> Self {
         Self { covariance, ..self.clone() }
     }
@@ -71,9 +76,9 @@ impl Uncertainty {
         &self.covariance
     }
 
-    /// For base parameters with the given covariance. `ratios` are factors κ on the band of each joint, from blocks of
-    /// the training logs that were left out of the fit ([`left_out_ratios`](dynident_estimation::left_out_ratios)), or
-    /// ones.
+    /// Creates the uncertainty for base parameters with the given covariance. `ratios` are factors κ on the band of
+    /// each joint, from blocks of the training logs that were left out of the fit
+    /// ([`left_out_ratios`](dynident_estimation::left_out_ratios)), or ones.
     pub fn of(estimate: &Estimate, covariance: DMatrix<f64>, ratios: &[f64]) -> Self {
         let degrees_of_freedom = estimate.degrees_of_freedom as f64;
         Self {
@@ -87,12 +92,13 @@ impl Uncertainty {
 
 /// Accumulates one joint's residuals.
 pub(crate) struct ResidualAccumulator {
-    /// Root of the covariance of the joint's columns.
+    /// Matrix square root of the covariance of the joint's columns.
     own: DMatrix<f64>,
-    /// Noise of the joint, and the factor `t κ`.
+    /// Noise standard deviation of the joint, and the factor `t κ` on the band.
     sigma: Option<(f64, f64)>,
     stiction: Stiction,
-    /// Columns of the panel whose sum is the velocity: viscous friction, or its two directions.
+    /// Columns of the panel whose sum is the velocity: the column of viscous friction, or its columns for both
+    /// directions.
     speed: Vec<usize>,
     /// Velocity of the joint that corresponds to 1 rad/s (m/s) of an arm of usual size.
     usual_speed: f64,
@@ -104,7 +110,7 @@ pub(crate) struct ResidualAccumulator {
     widths: f64,
     /// Number of columns of the joint.
     columns: usize,
-    /// Squares of the residual beyond friction at rest and the error of the motion, N² m² (N²).
+    /// Sum of the squared residuals that friction at rest and the low-pass of the positions do not explain, N² m² (N²).
     moving_squares: f64,
 }
 
@@ -130,8 +136,8 @@ impl ResidualAccumulator {
         });
         let directions = halves.map_or_else(Vec::new, |halves| places(&|term| halves.contains(term)));
         let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
-        // With V = L Lᵀ the variance of a prediction w is ‖Lᵀ w‖². L is computed by eigenvalues, since covariances from
-        // few segments are singular.
+        // With the covariance V = L Lᵀ, the variance of a prediction with the row w is ‖Lᵀ w‖². L is computed from
+        // eigenvalues, because covariances from few segments are singular.
         let own = uncertainty.map_or_else(
             || DMatrix::zeros(0, columns.len()),
             |uncertainty| {
@@ -161,8 +167,9 @@ impl ResidualAccumulator {
         }
     }
 
-    /// Adds rows of the joint: its panel (columns, then torque) and the predicted torque. `finer` has for each row the
-    /// prediction from positions with a higher cut-off and the friction at rest; empty if unknown.
+    /// Adds rows of the joint: regressor columns and torque (`panel`), and the predicted torque. For each row, `finer`
+    /// contains the prediction from positions with a higher cut-off and the largest torque of friction at rest; it is
+    /// empty if these are unknown.
     pub(crate) fn add(&mut self, panel: &[f64], rows: usize, predicted: &[f64], finer: &[[f64; 2]]) {
         let columns = self.columns;
         for row in 0..rows {
@@ -176,7 +183,7 @@ impl ResidualAccumulator {
                 self.regimes.add(speed / self.usual_speed, residual);
                 rests = speed.abs() < SpeedRanges::REST_BELOW * self.usual_speed;
             }
-            // Friction at rest, and the error of the motion.
+            // The torque that friction at rest and the low-pass of the positions explain.
             let explained = match finer.get(row) {
                 Some([finer, held]) => held + (finer - predicted[row]).abs(),
                 None if rests => self.stiction.level(panel, rows, row, predicted[row]),

@@ -5,7 +5,7 @@ use dynident_estimation::SpeedRanges;
 use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
 use dynident_rows::RegressorModel;
 
-/// Number of speeds, from the limit of rest to that of a reversal, on a logarithmic scale.
+/// Number of speeds between the limit of rest and the speed of a reversal, on a logarithmic scale.
 const SPEEDS: usize = 8;
 
 /// The largest friction of a joint near rest:
@@ -14,20 +14,21 @@ const SPEEDS: usize = 8;
 /// F(load) = max over |v| from 0.005 to 0.1 rad/s of |f(v) + |load| g(v)|
 /// ```
 ///
-/// with `f` the joint's friction at the velocity `v` (m/s for a prismatic joint, both for an arm of usual size) and `g`
-/// its friction per unit of load. A joint at rest is held by any torque within ±F (de Wit, Olsson, Åström and
-/// Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419). This torque depends on how the joint reached its rest, so
-/// positions do not determine it.
+/// Here `f` is the joint's friction at the velocity `v` (m/s for a prismatic joint; values for an arm of usual size)
+/// and `g` its friction per unit of load. The friction of a joint at rest can have any value within ±F (de Wit, Olsson,
+/// Åström and Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419). The value depends on how the joint came to
+/// rest, so positions do not determine it.
 #[derive(Clone, Debug)]
 pub struct Stiction {
-    /// Friction without load and per Nm (N) of load, at every velocity.
+    /// Friction without load, and friction per Nm (N) of load, at every velocity.
     levels: Vec<[f64; 2]>,
-    /// Numbers of the friction columns of the joint, and their values.
+    /// Indices of the joint's friction columns, and their values.
     friction: Vec<(usize, f64)>,
 }
 
 impl Stiction {
-    /// For a joint of a model with the values `theta` of all columns of its layout. Temperature terms are ignored.
+    /// Friction of a joint of a model; `theta` are the values of all columns of its layout. Temperature terms are
+    /// ignored.
     pub fn of(model: &RegressorModel, joint: usize, theta: &[f64]) -> Self {
         let layout = model.layout();
         let own = layout.joint_columns(joint).iter().enumerate();
@@ -53,19 +54,20 @@ impl Stiction {
         Self { levels: levels.collect(), friction: terms.iter().map(|&(place, value, _)| (place, value)).collect() }
     }
 
-    /// F for this load, Nm (N).
+    /// Largest friction F for this load, Nm (N).
     pub fn under(&self, load: f64) -> f64 {
         self.levels.iter().map(|[bare, loaded]| (bare + load.abs() * loaded).abs()).fold(0.0, f64::max)
     }
 
-    /// F in one row of the joint's panel of `rows` rows, Nm (N). The load is the `predicted` torque without friction.
+    /// Largest friction F in one row of the joint's panel of `rows` rows, Nm (N). The load is the `predicted` torque
+    /// without friction.
     pub(crate) fn level(&self, panel: &[f64], rows: usize, row: usize, predicted: f64) -> f64 {
         let friction: f64 = self.friction.iter().map(|(place, value)| value * panel[place * rows + row]).sum();
         self.under(predicted - friction)
     }
 }
 
-/// The value of a term's column for a joint while all joints move at a constant velocity, under a load of 1 Nm (N),
+/// Value of a term's column for a joint while all joints move at the same constant velocity under a load of 1 Nm (N),
 /// after a distance at which elements with hysteresis slip.
 fn steady(term: &TorqueTerm, joint: usize, dof: usize, velocity: f64) -> f64 {
     let (q, dq) = ([0.0, velocity.signum()].repeat(dof), vec![velocity; 2 * dof]);

@@ -1,7 +1,7 @@
-//! The sign of the torque by physical consistency.
+//! Test of the sign of the torque by physical consistency.
 //!
-//! Least squares fits either sign equally well, since all parameters change sign. A physically consistent set has
-//! positive masses and inertias and dissipative friction, so it fits only one sign.
+//! Least squares fits a reversed torque equally well, because all parameters can change their signs. A physically
+//! consistent set has positive masses and inertias and dissipative friction, so it fits only one sign.
 
 use crate::consistent::{ConsistencySettings, nearest_consistent_parameters};
 use crate::examination_settings::ExaminationSettings;
@@ -10,30 +10,33 @@ use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
-/// Residuals of physically consistent robots for both signs of the torque, without prior knowledge of the bodies.
+/// Residuals of the best physically consistent robot for both signs of the torque, without prior knowledge of the
+/// bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueSignCheck {
-    /// `100 ‖τ − W θ‖ / ‖τ‖` of the best physically consistent fit, rows in units of their joint's noise.
+    /// Residual of the best physically consistent fit, `100 ‖τ − W θ‖ / ‖τ‖` with torque τ, regressor W and base
+    /// parameters θ; rows in units of their joint's noise.
     pub residual_percent: f64,
-    /// The same for the torque with the opposite sign.
+    /// Residual of the best physically consistent fit to the torque with the opposite sign, in the same unit.
     pub residual_percent_if_reversed: f64,
 }
 
 impl TorqueSignCheck {
-    /// Whether only the opposite sign is physically consistent, by the default [`ExaminationSettings`].
+    /// Whether only the torque with the opposite sign is physically consistent, with the thresholds of the default
+    /// [`ExaminationSettings`].
     pub fn is_reversed(&self) -> bool {
         self.is_reversed_by(&ExaminationSettings::default())
     }
 
-    /// The same by other settings.
+    /// Whether only the torque with the opposite sign is physically consistent, with the thresholds in `settings`.
     pub fn is_reversed_by(&self, settings: &ExaminationSettings) -> bool {
         self.residual_percent_if_reversed < settings.max_reversed_ratio * self.residual_percent
     }
 }
 
-/// Fits a physically consistent set to the torque and to its negative. The prior is rough bodies of 1 kg without
-/// friction, not the nominal bodies. `None` if a fit fails.
+/// Fits a physically consistent set to the torque and to the torque with the opposite sign. The prior bodies are
+/// approximate bodies of 1 kg without friction, not the nominal bodies. `None` if a fit fails.
 pub fn sign_evidence(
     nominal: &ParametricModel,
     problem: &LinearProblem,
@@ -63,7 +66,7 @@ pub fn sign_evidence(
     Some(TorqueSignCheck { residual_percent: percent(1.0)?, residual_percent_if_reversed: percent(-1.0)? })
 }
 
-/// The finding of a reversed sign.
+/// The finding, if the sign is reversed.
 pub fn sign_findings(evidence: &TorqueSignCheck) -> Option<Finding> {
     evidence.is_reversed().then(|| Finding {
         code: "fit-torque-sign".to_owned(),

@@ -1,22 +1,22 @@
-//! Measured and predicted torque over time, for the report.
+//! Measured and predicted torque over time, for plots in the report.
 
 use super::motion_trace::MotionTrace;
 use dynident_events::LogEvent;
 use dynident_rows::{JointRows, RawSamples, RegressorModel, Role, predicted_torque};
 
-/// Largest number of rows of one joint: enough for a plot, and bounds the memory.
+/// Maximum number of rows of one joint; enough for a plot, and it limits the memory.
 const MAX_ROWS: usize = 100_000;
 
-/// Torque of one joint.
+/// Torque of one joint over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointTrace {
-    /// Measured torque with the filter of the fit, Nm (N); NaN in gaps and for unused rows.
+    /// Measured torque after the filter of the fit, Nm (N); NaN in gaps and for unused rows.
     pub measured_nm: Vec<f64>,
-    /// Predicted torque of the base parameters, Nm (N); NaN in gaps and for unused rows.
+    /// Torque that the base parameters predict, Nm (N); NaN in gaps and for unused rows.
     pub predicted_nm: Vec<f64>,
 }
 
-/// Torque of one joint around an event.
+/// Torque of one joint around an event, over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EventTrace {
     /// The event.
@@ -25,13 +25,13 @@ pub struct EventTrace {
     pub joint: String,
     /// Time, s after the first data row of the file.
     pub time_s: Vec<f64>,
-    /// Measured torque, Nm or N, as means over bins.
+    /// Measured torque, Nm or N, averaged over bins.
     pub measured_nm: Vec<f64>,
-    /// Torque of the model of the rest of the log, Nm or N.
+    /// Torque that a model of the rest of the log predicts, Nm or N.
     pub predicted_nm: Vec<f64>,
 }
 
-/// Measured and predicted torque of one log's first samples.
+/// Measured and predicted torque of the first samples of one log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogTrace {
     /// The log.
@@ -42,9 +42,9 @@ pub struct LogTrace {
     pub rate_hz: f64,
     /// Time of each row, s after the first data row of the file. Rows at the ends of a segment are missing.
     pub time_s: Vec<f64>,
-    /// Whether later rows of the log are left out.
+    /// Whether the log has later rows that are omitted.
     pub cut: bool,
-    /// Torque of each joint, in the model's order.
+    /// Torque of each joint, in the order of the model.
     pub joints: Vec<JointTrace>,
     /// Motion of the first minute.
     pub motion: MotionTrace,
@@ -59,7 +59,7 @@ pub(crate) struct TraceConsumer<'a> {
     theta: &'a [f64],
     trace: LogTrace,
     segment: Option<usize>,
-    /// For each segment its first row, and the time of that row in s.
+    /// For each segment, the index and the time (s) of its first row.
     starts: Vec<(usize, f64)>,
     buffer: Vec<f64>,
     max_rows: usize,

@@ -1,4 +1,4 @@
-//! A second pass over the first samples of a training log, with the estimated model.
+//! Second pass over the first samples of a training log, with the estimated model.
 
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
@@ -22,8 +22,8 @@ impl RowConsumer for SecondPass<'_> {
     }
 }
 
-/// Lags of the torque in recording number `index` (none if rows within a motion are left out), and its torque over
-/// time, with base parameters `theta`.
+/// Lags of the torque in recording `index`, and the measured and predicted torque over time, with base parameters
+/// `theta`. No lags are returned if rows within a motion are excluded.
 ///
 /// # Errors
 /// An unreadable recording.

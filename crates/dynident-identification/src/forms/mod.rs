@@ -1,8 +1,10 @@
-//! The model in forms that cannot hold all of its torque terms: URDF has no drive inertia, code has no memory.
+//! The identified model in export formats that cannot contain all of its torque terms: URDF, for example, has no drive
+//! inertia.
 //!
-//! Each form declares the [class of terms](dynident_model::terms::TermClass) that it can hold. Leaving a term out
-//! changes the torque, so the remaining terms are fitted again within the class, with the bodies of the identified
-//! model. The result is tested on the held-out recordings as a reader of the form computes it.
+//! Each format declares the [class of terms](dynident_model::terms::TermClass) that it can contain. Without one of its
+//! terms, the model predicts another torque. Therefore the values of the remaining terms are fitted again, with the
+//! bodies of the identified model. The result is tested on the held-out recordings, with the torque that a program
+//! computes from the exported file.
 
 mod refit;
 mod test;

@@ -1,4 +1,4 @@
-//! Terms of a class, fitted to the training recordings with the bodies of the identified model.
+//! Refit of the torque terms of a class to the training recordings, with the bodies of the identified model.
 
 use super::test::tested_forms;
 use crate::error::IdentificationError;
@@ -11,32 +11,35 @@ use dynident_rows::{Logs, RegressorModel, Role};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// The model with the torque terms of a class.
+/// The identified model restricted to the torque terms of a class.
 #[derive(Clone, Debug)]
 pub struct FormFit {
-    /// The class.
+    /// The class of terms.
     pub class: TermClass,
-    /// Its terms.
+    /// Torque terms of this class.
     pub terms: Vec<TorqueTerm>,
-    /// A value for each term, N m, N m s/rad, kg m² (N, N s/m, kg) per unit of the term.
+    /// Value of each term, N m, N m s/rad, kg m² (N, N s/m, kg) per unit of the term.
     pub values: Vec<f64>,
-    /// Whether terms of the identified model are missing in the class, so that the others were fitted again.
+    /// Whether the class lacks some terms of the identified model, so that the values of the remaining terms were
+    /// fitted again.
     pub is_refitted: bool,
-    /// Errors of the predicted torque on each held-out recording: the number of the recording and the report, in the
-    /// band of the identified model's own test.
+    /// Errors of the predicted torque on each held-out recording: the index of the recording and the report. The
+    /// frequency band is that of the identified model's own test.
     pub held_out: Vec<(usize, ValidationReport)>,
 }
 
 /// Fits the terms of every class to the training recordings `training` and tests them on the held-out recordings.
-/// `parameters` are all parameters of the identified model `robot`: ten for each body and one for each term. The bodies
-/// are kept, and so is the load of load-dependent friction. For each joint `j` with terms of its own `x_j`,
+/// `parameters` contains all parameters of the identified model `robot`: ten for each body and one for each term. The
+/// bodies and the load of load-dependent friction are kept. For each joint `j`, the values `x_j` of the joint's own
+/// terms are
 ///
 /// ```text
 /// min_x Σ ‖τ_j − W_j θ_bodies − A_j x_j‖²,    x_j ≥ 0 where the term cannot be negative
 /// ```
 ///
-/// over the filtered rows. Terms that a class cannot hold are not in the prediction. Recordings with a payload are not
-/// used. Joints `resting` do not move in the recordings: their terms approximate those of the identified model.
+/// over the filtered rows. Terms that a class cannot contain are omitted from the prediction. Recordings with a payload
+/// are not used. The joints in `resting` do not move in the recordings; their terms approximate the friction of the
+/// identified model.
 ///
 /// # Errors
 /// Recordings that cannot be read.
@@ -74,18 +77,18 @@ pub fn form_fits(
     Ok(found)
 }
 
-/// Largest velocity at which friction of a resting joint is approximated, rad/s or m/s of a usual arm.
+/// Largest velocity at which the friction of a resting joint is approximated, rad/s or m/s of an arm of usual size.
 const TYPICAL_VELOCITY: f64 = 1.0;
-/// Number of speeds in each direction at which it is approximated.
+/// Number of speeds in each direction at which this friction is approximated.
 const SPEEDS: usize = 50;
 
 /// The robot with the terms of all classes as columns.
 struct WideModel<'a> {
     robot: &'a ParametricModel,
-    /// Of the identified model.
+    /// Parameters of the identified model.
     parameters: &'a [f64],
     model: RegressorModel,
-    /// Base parameters of its bodies without any term.
+    /// Base parameters of its bodies, with all friction and drive terms zero.
     theta_bodies: Vec<f64>,
 }
 
@@ -117,14 +120,15 @@ impl<'a> WideModel<'a> {
         Ok(Self { robot, parameters, model, theta_bodies })
     }
 
-    /// The value of a term in the identified model, there possibly with another step; zero if it has no such term.
+    /// Value of a term in the identified model, where the term may have another velocity scale; zero if the model has
+    /// no such term.
     fn value(&self, term: &TorqueTerm) -> f64 {
         let bodies = self.parameters.len() - self.robot.terms().len();
         let place = self.robot.terms().iter().position(|own| own.symbol() == term.symbol());
         place.map_or(0.0, |place| self.parameters[bodies + place])
     }
 
-    /// Base parameters of one unit of a term.
+    /// Base parameters that correspond to one unit of a term.
     fn unit(&self, term: &TorqueTerm) -> Vec<f64> {
         let parametric = &self.model.parametric;
         let bodies = parametric.base().all_columns().len() - parametric.terms().len();
@@ -140,12 +144,12 @@ impl<'a> WideModel<'a> {
         theta.iter_mut().zip(self.unit(term)).for_each(|(theta, unit)| *theta += value * unit);
     }
 
-    /// The terms of a class with their values, and the base parameters of the wide model for them.
+    /// The terms of a class with their values, and the corresponding base parameters of the wide model.
     fn fit(&self, class: TermClass, factors: &[LogFactors], resting: &[usize]) -> (FormFit, Vec<f64>) {
         let mut fit =
             FormFit { class, terms: Vec::new(), values: Vec::new(), is_refitted: false, held_out: Vec::new() };
         let mut theta = self.theta_bodies.clone();
-        // Couplings and springs keep their values.
+        // Couplings and springs keep the values of the identified model.
         let is_held = |term: &&TorqueTerm| term.own_joint().is_none() || is_spring(term);
         for term in self.robot.terms().iter().filter(is_held) {
             if class.holds(term) {
@@ -183,7 +187,8 @@ impl<'a> WideModel<'a> {
         (fit, theta)
     }
 
-    /// Of several lists of terms of a joint the one with the least residual, with its values.
+    /// Selects among several lists of terms for a joint the one with the smallest residual, and returns it with its
+    /// values.
     fn best_list(
         &self,
         joint: usize,
@@ -199,7 +204,7 @@ impl<'a> WideModel<'a> {
         best.map_or_else(Default::default, |(_, terms, values)| (terms, values))
     }
 
-    /// The values of terms of a joint at rest that are nearest to the friction of the identified model, over velocities
+    /// Values of the terms of a resting joint that approximate the friction of the identified model best, at velocities
     /// up to that of a typical motion. Other terms keep their values.
     fn approximated(&self, joint: usize, terms: &[TorqueTerm]) -> Vec<f64> {
         let model = self.robot.model();
@@ -215,7 +220,7 @@ impl<'a> WideModel<'a> {
             }
             column[0]
         };
-        // Friction that both have and that depends on more than the velocity keeps its value.
+        // Friction that both models contain and that depends on more than the velocity keeps its value.
         let is_kept = |term: &TorqueTerm| {
             (term.has_memory() || term.needs_load()) && terms.iter().any(|kept| kept.symbol() == term.symbol())
         };
@@ -238,7 +243,7 @@ impl<'a> WideModel<'a> {
         terms.iter().map(|term| place(term).map_or_else(|| self.value(term), |place| x[place])).collect()
     }
 
-    /// The values of terms of a joint that fit its rows best, and the sum of squares that they explain, negative.
+    /// Values of the terms of a joint that fit its rows best, and minus the sum of squares that the terms explain.
     fn least_squares(
         &self,
         joint: usize,

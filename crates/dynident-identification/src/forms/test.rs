@@ -1,4 +1,4 @@
-//! Several sets of base parameters against held-out recordings, in one pass over each.
+//! Test of several sets of base parameters on held-out recordings, in one pass over each recording.
 
 use crate::examination::MotionBand;
 use dynident_estimation::{EstimationError, Validation, ValidationReport};
@@ -41,8 +41,8 @@ impl RowConsumer for FormsTest<'_> {
     }
 }
 
-/// For each of the recordings `held_out` the error of every set, in the band of the motion as
-/// [`examine_held_out`](crate::examination::examine_held_out) has it.
+/// For each of the recordings `held_out`, the torque error of every set in the frequency band of the motion, as in
+/// [`examine_held_out`](crate::examination::examine_held_out).
 ///
 /// # Errors
 /// Recordings that cannot be read.

@@ -1,4 +1,5 @@
-//! Candidate friction of a joint: terms, and for each term a grid of its constants with one column per point.
+//! Candidate friction of a joint: terms, and for each term a grid of its nonlinear constants with one column per grid
+//! point.
 
 use dynident_model::Model;
 use dynident_model::terms::{
@@ -7,12 +8,12 @@ use dynident_model::terms::{
 
 pub(super) type FrictionKind = &'static CandidateLaw;
 
-/// Whether one point of its grid is selected; otherwise all of its columns are used.
+/// Whether only one grid point of this kind of friction is selected; otherwise all of its columns are used.
 pub(super) fn takes_one(kind: FrictionKind) -> bool {
     kind.constants > 0
 }
 
-/// Columns that are tried together: neighbours on the grid, or all columns without a grid.
+/// Sets of columns that are tried together: neighbours on the grid, or all columns of a kind without a grid.
 pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Vec<usize>> {
     let of_kind: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == kind).collect();
     if !takes_one(kind) {
@@ -30,40 +31,40 @@ pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Ve
 pub(crate) struct CandidateColumn {
     pub(crate) kind: FrictionKind,
     pub(crate) term: TorqueTerm,
-    /// Terms stated if this column is selected: the term, or both directions of a directional term.
+    /// Terms that the model gets if this column is selected: the term, or both directions of a directional term.
     pub(crate) stated: Vec<TorqueTerm>,
-    /// Step on the first axis of the grid, ascending; `None` for a single candidate.
+    /// Index on the first axis of the grid, ascending; `None` for a single candidate.
     pub(crate) grid: Option<usize>,
-    /// Whether the search may select it; see [`FrictionSearch::laws`] and [`FrictionSearch::exportable`].
+    /// Whether the search may select this column; see [`FrictionSearch::laws`] and [`FrictionSearch::exportable`].
     pub(crate) is_permitted: bool,
 }
 
-/// Search for a joint's friction from the training logs.
+/// Settings of the selection of a joint's friction from the training logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionSearch {
     /// Name of the joint.
     pub joint: String,
-    /// Stated Coulomb step, which becomes a candidate. `None` by default.
+    /// Smoothed sign of the velocity in the stated Coulomb friction, which becomes a candidate. `None` by default.
     pub coulomb: Option<CoulombShape>,
-    /// Velocity below which the sign step is zero, rad/s or m/s. 0 by default.
+    /// Velocity below which the sign function of Coulomb friction is zero, rad/s or m/s. 0 by default.
     pub dead_band: f64,
-    /// Width of the step of load-dependent friction if the logs show no smooth step and none is stated, rad/s or m/s.
-    /// By default [`CoulombShape::USUAL_WIDTH`] of an arm of usual size.
+    /// Width of the smoothed sign in load-dependent friction if the logs do not determine a smoothed sign and none is
+    /// stated, rad/s or m/s. By default [`CoulombShape::USUAL_WIDTH`] of an arm of usual size.
     pub width: Option<f64>,
-    /// Whether rows near rest are used. Otherwise the step has the stated or usual width, and terms that differ from
-    /// others only near rest (Stribeck, sigmoid, cube root, elements with hysteresis) are not candidates. True by
+    /// Whether rows near rest are used. If not, the smoothed sign has the stated or usual width, and terms that differ
+    /// from others only near rest (Stribeck, sigmoid, cube root, elements with hysteresis) are not candidates. True by
     /// default.
     pub rows_near_rest: bool,
     /// Maximum variance inflation for Coulomb friction that differs by direction: `1 / (1 - R²)`, where R² is the share
-    /// of the difference that gravity, offset and all other columns explain. If gravity is constant or the joint has an
-    /// offset, only the rows near rest distinguish the difference from them, and its error bar grows by the square root
-    /// of the inflation. Unlimited by default. An iteration, which does not converge while a parameter is poorly
-    /// determined, uses [`MOST_INFLATION`](Self::MOST_INFLATION).
+    /// of the difference between both directions that gravity, offset and all other columns explain. If gravity is
+    /// constant or the joint has an offset, only rows near rest determine this difference, and its error bar grows by
+    /// the square root of the inflation. Unlimited by default. An iteration, which does not converge while a parameter
+    /// is poorly determined, uses [`MOST_INFLATION`](Self::MOST_INFLATION).
     pub most_inflation: Option<f64>,
-    /// Names of the laws that may be selected ([`CandidateLaw::name`]). Viscous friction and the Coulomb step are
-    /// always permitted. All laws by default.
+    /// Names of the laws that may be selected ([`CandidateLaw::name`]). Viscous and Coulomb friction are always
+    /// permitted. All laws by default.
     pub laws: Option<Vec<String>>,
-    /// Only laws that an exported file of this class holds without a loss. All laws by default.
+    /// Permits only laws that an export format of this class can contain without a loss. All laws by default.
     pub exportable: Option<TermClass>,
 }
 
@@ -92,13 +93,13 @@ impl FrictionSearch {
     }
 }
 
-/// Characteristic velocity and position of a joint, in units of an arm of usual size.
+/// Velocity scale and position scale of a joint, relative to an arm of usual size.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointScale {
     joint: usize,
-    /// Scale of a velocity; 1 for a usual arm.
+    /// Scale of velocities; 1 for an arm of usual size.
     pub(crate) velocity: f64,
-    /// Scale of a position; 1 for a usual arm.
+    /// Scale of positions; 1 for an arm of usual size.
     position: f64,
 }
 
@@ -108,7 +109,7 @@ impl JointScale {
         Self { joint, velocity: 1.0, position: 1.0 }
     }
 
-    /// Narrowest smooth step on the grid, rad/s (m/s).
+    /// Narrowest smoothed sign on the grid, rad/s (m/s).
     pub(super) fn narrowest_width(self) -> f64 {
         Coulomb::WIDTHS[0] * self.velocity
     }
@@ -119,16 +120,16 @@ impl JointScale {
     }
 }
 
-/// Viscous friction with a Coulomb step: the columns that determine the width of the step before other terms are
+/// Columns of viscous and Coulomb friction, which determine the width of the smoothed sign before other terms are
 /// selected.
 pub(crate) fn step_columns(search: &FrictionSearch, joint: JointScale) -> Vec<CandidateColumn> {
     let is_step = |column: &CandidateColumn| column.kind.role == CandidateRole::Base || column.kind.is_common_step();
     candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
 }
 
-/// Candidate columns of a joint; columns of a term are adjacent and in the order of its grid. `width` is the
-/// approximate width of the step if known. It is added to the grid, because a width between two points looks like a
-/// further term.
+/// Candidate columns of a joint. Columns of a term are adjacent and in the order of its grid. `width` is the
+/// approximate width of the smoothed sign, if known. It is added to the grid, because a width between two grid points
+/// would look like an additional term.
 pub(crate) fn candidate_columns(
     search: &FrictionSearch,
     JointScale { joint, velocity, position }: JointScale,

@@ -1,8 +1,8 @@
-//! Selection of friction by cross-validation within the training logs: joint by joint, in rounds, with the current
-//! friction of the other joints.
+//! Selection of friction by cross-validation within the training logs. It selects joint by joint, in two rounds, with
+//! the current friction of the other joints.
 //!
-//! The factors contain all candidate columns, so a candidate model is a selection of them (see [`CrossValidation`]);
-//! `search` contains the search for one joint.
+//! The triangular factors contain all candidate columns, so a candidate model is a selection of these columns (see
+//! [`CrossValidation`]). The module `search` contains the search for one joint.
 
 use super::candidates::{CandidateColumn, JointScale};
 use super::joint_friction::JointFriction;
@@ -13,15 +13,15 @@ use dynident_model::terms::{TorqueTerm, sort_terms};
 use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
-/// Numbers of time blocks; the second is for logs too short for the first.
+/// Number of time blocks; the second number is for logs that are too short for the first.
 const FOLDS: [usize; 2] = [10, 5];
-/// Rounds over all joints; from the second on, the others have their selected friction.
+/// Number of rounds over all joints. From the second round on, the other joints have their selected friction.
 const ROUNDS: usize = 2;
-/// Root mean square velocity below which a joint is at rest, rad/s or m/s of an arm of usual size; typical position
-/// noise of a resting joint.
+/// Root mean square velocity below which a joint is treated as resting, rad/s or m/s of an arm of usual size. It is a
+/// typical velocity noise of a resting joint.
 const MIN_SPEED: f64 = 1.0e-3;
 
-/// The robot with the selected friction; drive inertia and offset of a joint are kept.
+/// The robot with the selected friction. Drive inertia and offset of each joint are kept.
 ///
 /// # Errors
 /// Terms of unknown joints.
@@ -40,7 +40,7 @@ pub fn chosen_model(
     robot.with_terms(terms)
 }
 
-/// Divides the rows into blocks and returns their number; `None` if the logs are too short.
+/// Divides the rows into time blocks and returns the number of blocks; `None` if the logs are too short.
 fn cross_validation(problem: &LinearProblem) -> Result<Option<(CrossValidation<'_>, usize)>, EstimationError> {
     for folds in FOLDS {
         match CrossValidation::new(problem, folds) {
@@ -52,14 +52,14 @@ fn cross_validation(problem: &LinearProblem) -> Result<Option<(CrossValidation<'
     Ok(None)
 }
 
-/// Weights of the rows as in the plain fit.
+/// Weights of the joints' rows, as in the fit `plain`.
 fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
     let of_sigma = |sigma: &f64| if equal || *sigma <= 0.0 { 1.0 } else { sigma.recip() };
     plain.joint_sigma.iter().map(of_sigma).collect()
 }
 
-/// Columns after the base parameters (payloads, offsets of single logs, gains), which every candidate model contains:
-/// their indices in `wide_problem`, if the fit `plain` of `model` excites them.
+/// Indices in `wide_problem` of the columns after the base parameters (payloads, offsets of single logs, gains). Every
+/// candidate model contains these columns if the fit `plain` of `model` excites them.
 pub(super) fn further_columns(
     model: &RegressorModel,
     plain: &Estimate,
@@ -72,9 +72,9 @@ pub(super) fn further_columns(
     (0..further).filter(move |place| !fixed.contains(&(base + place))).map(move |place| wide_base + place)
 }
 
-/// Selects the friction of the joints in `candidates`: pairs of a joint and its candidate columns, all of them
-/// columns of `wide_problem`. `plain` is the fit with the stated terms, with equal weights of the joints if
-/// `equal_weights`. `limits` has the thresholds of the search for each entry of `candidates`.
+/// Selects the friction of the joints in `candidates`: pairs of a joint and its candidate columns, all of them columns
+/// of `wide_problem`. `plain` is the fit with the stated terms; `equal_weights` states whether its joints have equal
+/// weights. `limits` contains the thresholds of the search for each entry of `candidates`.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
@@ -105,8 +105,8 @@ pub(crate) fn choose_friction(
             if speed < MIN_SPEED * scale.velocity {
                 return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
             }
-            // The stated model as far as it is excited, without this joint's friction, and with the selected friction
-            // of other joints.
+            // The excited columns of the stated model, without the friction of this joint, and with the selected
+            // friction of other joints.
             let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
             let kept = |index: &usize| match &model.layout().columns()[*index] {
                 Column::Term(term) if term.is_joint_friction() => {

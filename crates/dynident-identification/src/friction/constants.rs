@@ -1,15 +1,15 @@
-//! Steps at zero velocity of a joint's terms, and means of terms with different constants.
+//! Smoothed sign functions of a joint's friction terms, and means of terms with different constants.
 
 use super::candidates::JointScale;
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
-/// Step of a term that changes its sign at rest.
+/// Smoothed sign of the velocity in a term that changes its sign at rest; `None` for other terms.
 pub(super) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
     term.step().filter(|_| term.kind().step_role() != StepRole::Fixed)
 }
 
-/// Step of a joint's dry friction; the sign function by default.
+/// Smoothed sign of a joint's dry friction; the exact sign function by default.
 pub(crate) fn step_of_joint(robot: &ParametricModel, joint: usize) -> CoulombShape {
     let mut own = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
     own.find_map(step_of).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
@@ -20,7 +20,7 @@ pub(crate) fn is_coulomb(term: &TorqueTerm) -> bool {
     term.kind().step_role() == StepRole::Joint
 }
 
-/// Width of the smooth step of a term that changes its sign at rest, rad/s (m/s).
+/// Width of the smoothed sign in a term that changes its sign at rest, rad/s (m/s); `None` for an exact sign.
 pub(crate) fn smooth_width(term: &TorqueTerm) -> Option<f64> {
     match step_of(term)? {
         CoulombShape::Smooth { width } => Some(width),
@@ -28,9 +28,9 @@ pub(crate) fn smooth_width(term: &TorqueTerm) -> Option<f64> {
     }
 }
 
-/// Gives the terms of a joint the step of its Coulomb friction, because they are one friction, `(F_c + F_s
-/// e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction keeps a separate step if the Coulomb step is smooth: real joints
-/// creep before they break away, and the data distinguish both steps.
+/// Gives all friction terms of a joint the smoothed sign s of its Coulomb friction, because they describe one friction,
+/// `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction keeps a separate smoothed sign if that of Coulomb
+/// friction is wide: real joints creep before they break away, and the data distinguish both widths.
 pub(super) fn with_one_step(terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     let Some(step) = terms.iter().find(|term| is_coulomb(term)).and_then(step_of) else { return terms };
     let with_step = |term: TorqueTerm| match (term.kind().step_role(), step) {
@@ -41,7 +41,8 @@ pub(super) fn with_one_step(terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     terms.into_iter().map(with_step).collect()
 }
 
-/// Mean of terms that differ in their constants: weighted mean of their coordinates.
+/// Mean of terms that differ only in their constants: the weighted mean of these constants, in the coordinates of the
+/// grid.
 ///
 /// # Panics
 /// If `weighted` is empty.

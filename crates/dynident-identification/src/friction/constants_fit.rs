@@ -1,12 +1,14 @@
-//! Estimation of friction constants (width of a step, Stribeck velocity and exponent, ..) together with all parameters.
+//! Estimation of nonlinear friction constants (width of the smoothed sign, Stribeck velocity and exponent, ..) together
+//! with all parameters.
 //!
-//! A constant c changes the torque only through the column of its term. Around the current constants `τ = Y(c) θ + Σ_k
-//! ∂(Y θ)/∂c_k δ_k`, so that with one additional column per constant least squares finds the step δ and its effect on
-//! the parameters (Gauss-Newton; for separable problems: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The
-//! derivative is the difference of the term's columns on both sides of c, which one pass over the logs adds to the
-//! factors. Iteration ends when the steps are small compared with their standard deviations. The covariance of the last
-//! step is that of the constants. The sensitivity of the parameters is `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`, and their error
-//! bars must include it.
+//! A constant c changes the torque τ only through the regressor column of its term. Near the current constants,
+//! `τ = Y(c) θ + Σ_k ∂(Y θ)/∂c_k δ_k` with the regressor Y, the parameters θ and the changes δ_k of the constants. With
+//! one additional column per constant, least squares determines the step δ together with the parameters (Gauss-Newton;
+//! for separable problems: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The derivative is computed as the
+//! difference of the term's columns for a larger and a smaller constant, which one pass over the logs adds to the
+//! triangular factors. The iteration ends when the steps are small compared with their standard deviations. The
+//! covariance of the last step is the covariance of the constants. The parameters depend on the constants with the
+//! sensitivity `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`, and the error bars of the parameters include this effect.
 
 use super::candidates::JointScale;
 use super::constants::step_of;
@@ -20,17 +22,18 @@ use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Half distance of the central differences, in units of a constant's logarithm.
+/// Distance of the two points of a central difference from the current constant, as the change of the constant's
+/// logarithm.
 const HALF_DIFFERENCE: f64 = 0.1;
-/// Maximum step of a constant's logarithm in one pass: one step of the grid.
+/// Maximum change of a constant's logarithm in one pass: one step of the grid.
 const MAX_STEP: f64 = 0.7;
-/// Prior standard deviation of a constant's logarithm. Its grid spans a factor of 40 to 100; a uniform distribution
-/// over it has 1.1 to 1.3. The prior bounds constants that the rows do not determine.
+/// Prior standard deviation of a constant's logarithm. The grid spans a factor of 40 to 100, and a uniform distribution
+/// over it has a standard deviation of 1.1 to 1.3. The prior bounds constants that the rows do not determine.
 const PRIOR_STD: f64 = 1.2;
-/// Convergence: every step is below this ratio of its standard deviation, or below this absolute value.
+/// Convergence criterion: every step is below this ratio of its standard deviation, or below this absolute value.
 const CONVERGENCE: (f64, f64) = (0.1, 2.0e-3);
-/// Maximum ratio of reported standard deviation to that of white noise. A step that is long compared with the product
-/// has certainly not converged.
+/// Assumed maximum ratio of the reported standard deviation to that for white noise. A step that is long compared with
+/// this multiple of the white-noise standard deviation has certainly not converged.
 const MAX_STD_INFLATION: f64 = 10.0;
 
 #[derive(Clone, Debug)]
@@ -40,7 +43,7 @@ pub(crate) struct FrictionConstants {
     axes: Vec<Axis>,
 }
 
-/// One constant and the terms of a joint that share it: steps at rest have one width.
+/// One free constant, and the terms of a joint that share it: all smoothed signs of a joint have the same width.
 #[derive(Clone, Debug)]
 struct Axis {
     joint: usize,
@@ -50,23 +53,25 @@ struct Axis {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsStep {
-    /// Steps of the constants' logarithms, one per axis.
+    /// Steps of the constants' logarithms, one for each constant.
     pub(crate) steps: Vec<f64>,
     std: Vec<f64>,
     error: ConstantsError,
-    /// Parameters with free constants; columns of the model first.
+    /// Estimate with free constants; parameters of the model first, then the constants.
     estimate: Estimate,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct ConstantsError {
     symbols: Vec<String>,
-    /// `S Σ_c Sᵀ`, by symbol.
+    /// Covariance `S Σ_c Sᵀ` that the error of the constants causes in the parameters, by symbol: sensitivity S and
+    /// covariance Σ_c of the constants.
     covariance: DMatrix<f64>,
 }
 
 impl ConstantsError {
-    /// The covariance that this error adds to an estimate of the columns `symbols`; zero for held columns.
+    /// Covariance that the error of the constants adds to an estimate of the parameters `symbols`; zero for fixed
+    /// parameters.
     pub(crate) fn covariance_of(&self, symbols: &[String], estimate: &Estimate) -> DMatrix<f64> {
         let is_fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
         let place = |column: usize| self.symbols.iter().position(|own| *own == symbols[column]);
@@ -88,12 +93,12 @@ impl ConstantsStep {
         self.is_below(1.0)
     }
 
-    /// Whether a step with white-noise error bars may have converged by the reported error bars.
+    /// Whether a step, whose error bars assume white noise, may have converged according to the reported error bars.
     pub(crate) fn may_have_converged(&self) -> bool {
         self.is_below(MAX_STD_INFLATION)
     }
 
-    /// Whether all steps are small compared with their error bars times `inflation`.
+    /// Whether all steps are small compared with their error bars, multiplied by `inflation`.
     fn is_below(&self, inflation: f64) -> bool {
         let small = |(step, std): (&f64, &f64)| step.abs() <= (CONVERGENCE.0 * inflation * std).max(CONVERGENCE.1);
         self.steps.iter().zip(&self.std).all(small)
@@ -117,7 +122,8 @@ impl FrictionConstants {
         self.axes.is_empty()
     }
 
-    /// The terms of the joints with their constants moved by these steps of their logarithms, one per axis.
+    /// Terms of the joints after the logarithms of their constants are changed by these steps, one step for each
+    /// constant.
     pub(crate) fn moved(&self, steps: &[f64]) -> Vec<(usize, Vec<TorqueTerm>)> {
         let mut moved = self.joints.clone();
         for (place, (_, terms)) in moved.iter_mut().enumerate() {
@@ -135,8 +141,8 @@ impl FrictionConstants {
         moved
     }
 
-    /// For each joint with a further term that is `weak` with free constants: its terms without the weakest one.
-    /// `norms` are those of the model's columns over all rows.
+    /// For each joint with additional terms that are `weak` when their constants are free: the terms of the joint
+    /// without the weakest one. `norms` are the norms of the model's columns over all rows.
     pub(crate) fn without_weakest(
         &self,
         weak: Weak,
@@ -154,8 +160,8 @@ impl FrictionConstants {
         self.joints.iter().enumerate().filter_map(of_joint).collect()
     }
 
-    /// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`. Other
-    /// arguments as in [`without_weakest`](Self::without_weakest).
+    /// Whether a joint has possibly insignificant additional terms that were not in its first selection, `before`.
+    /// Other arguments as in [`without_weakest`](Self::without_weakest).
     pub(crate) fn has_doubtful_term(
         &self,
         joint: usize,
@@ -172,7 +178,8 @@ impl FrictionConstants {
         test.has_doubtful_term(&self.joints[place].1, before, own_constants)
     }
 
-    /// Columns of the constants that only this term of the joint at `place` has, in a step whose axes begin at `first`.
+    /// Columns of the constants that only the term `term` has. `place` is the index of the joint; `first` is the first
+    /// column of the constants.
     fn own_constants(&self, place: usize, term: &TorqueTerm, first: usize) -> Vec<usize> {
         let terms = &self.joints[place].1;
         let is_own = |axis: &Axis| axis.joint == place && matches!(axis.terms[..], [only] if terms[only] == *term);
@@ -180,10 +187,10 @@ impl FrictionConstants {
         own.map(|(number, _)| first + number).collect()
     }
 
-    /// Design effect for the friction of a joint: number of correlated rows with the information of one independent
-    /// row. It is the mean variance ratio `tr(Σ_w⁻¹ Σ) / p` of its p coefficients and constants, with the reported
-    /// covariance Σ and that of white noise Σ_w (Rao and Scott, Annals of Statistics 12 (1984) 46); at least 1, and 1
-    /// if unknown.
+    /// Design effect for the friction of a joint: number of correlated rows that contain as much information as one
+    /// independent row. It is the mean variance ratio `tr(Σ_w⁻¹ Σ) / p` of the p coefficients and constants of the
+    /// friction, with the reported covariance Σ and the covariance for white noise Σ_w (Rao and Scott, Annals of
+    /// Statistics 12 (1984) 46). It is at least 1, and 1 if unknown.
     pub(crate) fn design_effect(&self, joint: usize, model: &RegressorModel, last: &ConstantsStep) -> f64 {
         let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return 1.0 };
         let estimate = &last.estimate;
@@ -201,7 +208,7 @@ impl FrictionConstants {
         if ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
     }
 
-    /// The term at a distance of `step` along an axis.
+    /// The term with the logarithm of one of its constants changed by `step`.
     fn beside(&self, axis: &Axis, number: usize, step: f64) -> TorqueTerm {
         let term = &self.joints[axis.joint].1[number];
         let mut own = term.kind().coordinates();
@@ -209,7 +216,7 @@ impl FrictionConstants {
         term.at(&own, self.scales[axis.joint].velocity)
     }
 
-    /// Terms on both sides of the constants along every axis: additional columns of a pass.
+    /// Terms with a smaller and a larger value of every constant, which are the additional columns of a pass.
     pub(crate) fn neighbours(&self) -> Vec<TorqueTerm> {
         let of_axis = |axis: &Axis| -> Vec<TorqueTerm> {
             axis.terms
@@ -220,9 +227,9 @@ impl FrictionConstants {
         self.axes.iter().flat_map(of_axis).collect()
     }
 
-    /// The step with its covariance, by `solve`. `fitted` are the values with the current constants, over the columns
-    /// of `model` and then those of loads. `wide_problem` also has the columns of `wide`, including all
-    /// [`neighbours`](Self::neighbours).
+    /// Computes the step and its covariance with the function `solve`. `fitted` are the values with the current
+    /// constants: those of the columns of `model`, then those of payloads. `wide_problem` also contains the columns of
+    /// `wide`, including all [`neighbours`](Self::neighbours).
     pub(crate) fn step(
         &self,
         model: &RegressorModel,
@@ -241,7 +248,7 @@ impl FrictionConstants {
         let step = |(place, axis): (usize, &Axis)| {
             found.values[count + place] * (MAX_STEP / furthest(axis.joint).max(MAX_STEP))
         };
-        // Sensitivity with white noise, because least squares uses these weights.
+        // The sensitivity is computed with the covariance for white noise, because least squares uses these weights.
         let white = found.covariance_white.view((count, count), (own, own)).into_owned();
         let across = found.covariance_white.view((0, count), (count, own)).into_owned();
         let covariance = match white.cholesky() {
@@ -260,7 +267,8 @@ impl FrictionConstants {
         })
     }
 
-    /// `[Y(c) | ∂(Y θ)/∂c]`: columns of the model, those of loads, and one per constant.
+    /// Linearised problem with the columns `[Y(c) | ∂(Y θ)/∂c]`: columns of the model, columns of payloads, and one
+    /// column for each constant.
     fn linearised(
         &self,
         model: &RegressorModel,
@@ -271,7 +279,7 @@ impl FrictionConstants {
         let (own, further) = (model.layout().columns().len(), wide.layout().columns().len());
         let loads = wide_problem.columns().len() - further;
         let count = own + loads;
-        // New index of a column of the wide problem; neighbours are removed.
+        // New index of a column of the wide problem; the columns of neighbours are removed.
         let kept = |column: usize| match column {
             column if column < own => Some(column),
             column if column < further => None,
@@ -279,7 +287,7 @@ impl FrictionConstants {
         };
         let old = |column: usize| if column < own { column } else { column - own + further };
 
-        // ∂(Y θ)/∂c = θ (Y(c + h) - Y(c - h)) / 2h, summed over the terms with this constant.
+        // ∂(Y θ)/∂c = θ (Y(c + h) - Y(c - h)) / 2h, summed over all terms with this constant.
         let place = |term: &TorqueTerm| {
             wide.layout().columns().iter().position(|column| matches!(column, Column::Term(own) if own == term))
         };
@@ -334,7 +342,7 @@ impl FrictionConstants {
             problem.add(&wide_problem.logs()[rows.log], rows.joint, columns, factor)?;
         }
 
-        // Prior: that of the parameters is unchanged, constants are near their current values.
+        // The prior of the parameters is unchanged. The prior of the constants keeps them near their current values.
         let before = wide_problem.prior();
         let known = before.map_or(0, |prior| prior.sqrt_information().nrows());
         let mean = before.map_or_else(|| vec![0.0; count + self.axes.len()], |prior| padded(prior.mean()));
@@ -347,7 +355,7 @@ impl FrictionConstants {
         problem.with_prior(mean, information)
     }
 
-    /// Constants of every joint with their 95 % intervals, in the order of the joints.
+    /// Constants of every joint with their 95 % intervals, joint by joint.
     pub(crate) fn with_intervals(&self, last: &ConstantsStep) -> Vec<(usize, Vec<FrictionConstant>)> {
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let of_axis = |(axis, std): (&Axis, &f64)| {
@@ -375,7 +383,8 @@ impl FrictionConstants {
     }
 }
 
-/// Axes of one joint's terms. Terms that change their sign at rest share one width, because they are one friction.
+/// Free constants of one joint's terms. Terms that change their sign at rest share one width, because they describe one
+/// friction.
 fn axes_of(joint: usize, terms: &[TorqueTerm]) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
     for (number, term) in terms.iter().enumerate() {

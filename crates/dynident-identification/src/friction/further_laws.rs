@@ -1,4 +1,4 @@
-//! Columns of further friction laws of one joint, among which identification selects automatically.
+//! Columns of further friction laws of one joint, from which an identification selects automatically.
 
 use super::constants::step_of_joint;
 use dynident_dynamics::ParametricModel;
@@ -11,8 +11,8 @@ const STRIBECK_RAD_S: [f64; 3] = [0.03, 0.1, 0.3];
 /// Number of columns.
 pub(crate) const FURTHER_LAWS: usize = 4 + STRIBECK_RAD_S.len();
 
-/// Further friction of one joint: load dependence `|τ| s(q̇)`, asymmetry `|s(q̇)|` and `|q̇|`, square root
-/// `s(q̇) √|q̇|`, Stribeck `s(q̇) e^(−(q̇/v)²)`.
+/// Further friction laws of one joint, with its smoothed sign s: load dependence `|τ| s(q̇)`, asymmetry `|s(q̇)|` and
+/// `|q̇|`, square root `s(q̇) √|q̇|`, Stribeck `s(q̇) e^(−(q̇/v)²)`.
 pub(crate) struct FurtherLaws {
     step: CoulombShape,
     stribeck: [f64; STRIBECK_RAD_S.len()],
@@ -25,7 +25,7 @@ impl FurtherLaws {
         Self { step: step_of_joint(robot, joint), stribeck: STRIBECK_RAD_S.map(own_velocity) }
     }
 
-    /// The columns at a velocity, rad/s (m/s), with the load on the joint, Nm (N).
+    /// Values of the columns at the velocity `dq`, rad/s (m/s), with the load `load` on the joint, Nm (N).
     pub(crate) fn row(&self, dq: f64, load: f64) -> [f64; FURTHER_LAWS] {
         let step = self.step.step(dq);
         let [a, b, c] = self.stribeck.map(|speed| step * (-(dq / speed).powi(2)).exp());

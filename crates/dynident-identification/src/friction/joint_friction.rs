@@ -4,42 +4,44 @@ use super::candidates::FrictionKind;
 use dynident_model::terms::TorqueTerm;
 use serde::{Deserialize, Serialize};
 
-/// Selection of one joint's friction.
+/// Result of the selection of one joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointFriction {
     /// Name of the joint.
     pub joint: String,
-    /// Selected friction, or the reason for keeping the stated terms.
+    /// Selected friction, or the reason why the stated terms are kept.
     pub chosen: String,
     /// Friction terms of the joint; `None` if nothing was selected.
     pub terms: Option<Vec<TorqueTerm>>,
-    /// Constants of these terms, estimated together with all parameters.
+    /// Nonlinear constants of these terms, estimated together with all parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub constants: Vec<FrictionConstant>,
     /// Number of time blocks of the cross-validation.
     pub folds: usize,
     /// Compared candidates, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
-    /// The selection among all laws, if the study restricts them.
+    /// Friction that would be selected among all laws, if the study restricts the laws.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unrestricted: Option<UnrestrictedFriction>,
 }
 
-/// What a restriction of the laws costs: the selection without it.
+/// Loss of accuracy because the study restricts the friction laws: the selection without the restriction, for
+/// comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UnrestrictedFriction {
     /// Friction that would be selected among all laws.
     pub chosen: String,
-    /// Root mean square of the joint's residual on left-out blocks with it, Nm (N).
+    /// Root mean square residual of the joint with this friction on left-out time blocks, Nm (N).
     pub cv_error_nm: f64,
-    /// The same with the friction that was selected among the permitted laws, Nm (N).
+    /// Root mean square residual of the joint with the friction that was selected among the permitted laws, on left-out
+    /// time blocks, Nm (N).
     pub restricted_cv_error_nm: f64,
 }
 
 impl JointFriction {
-    /// Keeps the stated friction for this reason.
+    /// Result for a joint that keeps its stated friction, with the reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
         let chosen = format!("as the study states: {reason}");
         Self {
@@ -65,46 +67,47 @@ impl JointFriction {
     }
 }
 
-/// A constant of a selected friction term.
+/// A nonlinear constant of a selected friction term.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionConstant {
-    /// Term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
+    /// Name of the term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
     pub term: String,
-    /// Constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
+    /// Name of the constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
     pub constant: String,
     /// Value: widths and velocities in rad/s (m/s), steepness in s/rad (s/m).
     pub value: f64,
-    /// 95 % interval from the residual, with a weak prior of a factor of 10 in both directions. It is symmetric on a
-    /// logarithmic scale.
+    /// The 95 % interval, from the residuals and a weak prior that spans a factor of 10 in both directions. It is
+    /// symmetric on a logarithmic scale.
     pub interval_95: [f64; 2],
 }
 
 impl FrictionConstant {
-    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if the constant belongs to
-    /// another term or does not set the width of the step.
+    /// Width of the narrowest smoothed sign of `term` within the 95 % interval, rad/s (m/s). `None` if the constant
+    /// belongs to another term or does not determine the width.
     pub fn narrowest_step(&self, term: &TorqueTerm) -> Option<f64> {
         let widths = self.interval_95.iter().filter_map(|&end| term.kind().step_width_by(&self.constant, end));
         widths.reduce(f64::min).filter(|_| term.kind_name() == self.term)
     }
 }
 
-/// One candidate model of a joint's friction.
+/// One candidate model for a joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionCandidate {
-    /// Terms of the model.
+    /// Friction terms of the candidate.
     #[serde(rename = "law")]
     pub term: String,
     /// Symbols of the parameters that are not zero.
     pub parameters: Vec<String>,
-    /// Number of parameters and tuned constants.
+    /// Number of parameters and of tuned constants.
     pub complexity: usize,
-    /// Root mean square of the joint's residual on left-out blocks, Nm (N).
+    /// Root mean square residual of the joint on left-out time blocks, Nm (N).
     pub cv_error_nm: f64,
-    /// Mean square error above the minimum of all candidates, in standard errors of this difference; 0 for the minimum.
+    /// Mean square error minus the minimum over all candidates, in standard errors of this difference; 0 for the
+    /// candidate with the minimum.
     pub excess_standard_errors: f64,
-    /// Whether it was selected.
+    /// Whether the candidate was selected.
     pub chosen: bool,
 }
 

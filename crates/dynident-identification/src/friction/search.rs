@@ -1,20 +1,20 @@
-//! Search for one joint's friction among columns of its factors.
+//! Search for one joint's friction among the candidate columns in its triangular factors.
 //!
-//! Coulomb friction that differs by direction is tried if the rows distinguish it from gravity, offsets and the other
-//! columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
+//! Coulomb friction that differs by direction is only tried if the rows distinguish it from gravity, offsets and the
+//! other columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
 //!
-//! The search starts with viscous friction and a Coulomb step, and with the same plus a sigmoid. It adds one term at a
-//! time, the one with the largest reduction of the error. Of all tried candidates, it selects the simplest one whose
-//! mean square error is within one standard error of the minimum (Hastie, Tibshirani and Friedman, *The Elements of
-//! Statistical Learning*, 7.10). The standard error is that of the difference by block, because blocks differ far more
-//! than candidates.
+//! The search starts twice: with viscous and Coulomb friction, and with these two and a sigmoid. It adds one term at a
+//! time, always the term that reduces the error most. Of all tried candidates, it selects the simplest one whose mean
+//! square error is within one standard error of the minimum (Hastie, Tibshirani and Friedman, *The Elements of
+//! Statistical Learning*, 7.10). The standard error is computed from the differences between two candidates in each
+//! time block, because blocks differ far more than candidates.
 //!
-//! A law with memory or under load costs more than its parameters: not every controller and simulator can hold it. It
-//! is selected if its gain over the best selection without such laws is clear
-//! ([`FrictionThresholds`](crate::FrictionThresholds)).
+//! Laws with hysteresis or load dependence have a disadvantage besides their additional parameters: not every
+//! controller and simulator supports them. Such a law is selected only if it is clearly better than the best selection
+//! without such laws ([`FrictionThresholds`](crate::FrictionThresholds)).
 //!
-//! A constant of a term (a width, a velocity) may lie between two neighbours of its grid, whose columns together
-//! approximate the column between them. So a coarse grid does not cause additional terms.
+//! A nonlinear constant of a term (a width, a velocity) may lie between two neighbouring grid points. The columns of
+//! both points together approximate the column between them, so a coarse grid does not cause additional terms.
 
 use super::candidates::{CandidateColumn, FrictionKind, JointScale, options, takes_one};
 use super::constants::{mean_term, with_one_step};
@@ -23,7 +23,7 @@ use crate::thresholds::FrictionThresholds;
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::{CandidateRole, TorqueTerm};
 
-/// Maximum number of terms added to viscous friction and a step.
+/// Maximum number of terms that are added to viscous and Coulomb friction.
 const MAX_ADDED_TERMS: usize = 3;
 
 struct ScoredCandidate {
@@ -33,13 +33,13 @@ struct ScoredCandidate {
 }
 
 impl ScoredCandidate {
-    /// Columns of a kind with a nonzero value.
+    /// Columns of one kind of friction whose value is not zero.
     fn present(&self, columns: &[CandidateColumn], kind: FrictionKind) -> Vec<(usize, f64)> {
         let values = self.places.iter().copied().zip(self.errors.coefficients.iter().copied());
         values.filter(|&(place, value)| value != 0.0 && columns[place].kind == kind).collect()
     }
 
-    /// Its terms with nonzero values, with their constants; both directions of a directional term.
+    /// Terms of this candidate with nonzero values, with their constants; both directions of a directional term.
     fn terms(&self, columns: &[CandidateColumn], scale: JointScale) -> Vec<TorqueTerm> {
         self.kinds.iter().flat_map(|&kind| self.terms_of(columns, kind, scale)).collect()
     }
@@ -56,7 +56,7 @@ impl ScoredCandidate {
             return stated;
         }
         let Some(&(first, _)) = present.first() else { return Vec::new() };
-        // One point of the grid can have several terms.
+        // One grid point can have several terms.
         let weighted = |number: usize| -> Vec<(&TorqueTerm, f64)> {
             present.iter().map(|&(place, value)| (&columns[place].stated[number], value)).collect()
         };
@@ -91,8 +91,8 @@ impl ScoredCandidate {
     }
 }
 
-/// Best constants of a model with the given terms. Constants of `before` are kept, except those of the step, whose
-/// velocities overlap with those of the new term.
+/// Finds the best constants of a model with the given kinds of terms. Constants in `before` are kept, except those of
+/// the smoothed sign, whose velocities overlap with those of the new term.
 fn tuned(
     folds: &JointFolds,
     columns: &[CandidateColumn],
@@ -125,15 +125,15 @@ fn tuned(
         places,
         errors,
     });
-    // The first of equals, for reproducible results.
+    // Among equal candidates the first one is selected, so that results are reproducible.
     evaluated
         .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })
         .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
-/// Variance inflation of the difference between both directions of a model's Coulomb step, given the model's other
-/// columns and the common ones: `|s|` is constant except near rest, and gravity can be constant too. 1 for a model
-/// without that step.
+/// Variance inflation of the difference between both directions of Coulomb friction in a model, given the model's other
+/// columns and the common columns. (`|s|` of the smoothed sign s is constant except near rest, and gravity can be
+/// constant, too.) 1 for a model without such a difference.
 fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &ScoredCandidate) -> f64 {
     let steps: Vec<(usize, f64)> = model
         .kinds
@@ -144,7 +144,7 @@ fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &
     let whole: f64 = steps.iter().map(|(_, value)| value).sum();
     let (mut difference, mut sum) = (Vec::new(), Vec::new());
     for (place, value) in steps {
-        // A sign step has no grid index; the narrowest smooth step replaces it.
+        // An exact sign function has no grid index; the narrowest smoothed sign is used instead.
         let step = columns[place].grid.unwrap_or(0);
         let is_direction = |at: &usize| is_step_by_direction(columns[*at].kind) && columns[*at].grid == Some(step);
         let mut directions = (0..columns.len()).filter(is_direction);
@@ -170,8 +170,8 @@ fn is_step_by_direction(kind: FrictionKind) -> bool {
     kind.is_step && !kind.is_common_step()
 }
 
-/// Adds terms to `start` one at a time, always the one with the largest reduction of the error. All tried models are
-/// appended to `tried`.
+/// Adds terms to `start` one at a time, always the term that reduces the error most. All tried models are appended to
+/// `tried`.
 fn add_terms(
     folds: &JointFolds,
     columns: &[CandidateColumn],
@@ -219,7 +219,7 @@ fn add_terms(
     }
 }
 
-/// Candidates that a search compared, and its selection among them.
+/// Candidates that a search compared, and the index of the selected one.
 struct Selection {
     tried: Vec<ScoredCandidate>,
     chosen: usize,
@@ -228,7 +228,7 @@ struct Selection {
 }
 
 impl Selection {
-    /// Compares models of the permitted kinds.
+    /// Compares models with the permitted kinds of terms.
     fn new(
         folds: &JointFolds,
         columns: &[CandidateColumn],
@@ -245,7 +245,7 @@ impl Selection {
         let least = (0..tried.len()).reduce(by_error).unwrap_or(0);
         let excess: Vec<[f64; 2]> = tried.iter().map(|one| one.errors.excess_over(&tried[least].errors)).collect();
         let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
-        // Among equally simple candidates, prefer the smaller error.
+        // Among equally simple candidates, the smaller error is preferred.
         let order = |a: &usize, b: &usize| {
             let complexity = |index: usize| tried[index].complexity(columns);
             complexity(*a).cmp(&complexity(*b)).then(tried[*a].errors.rms().total_cmp(&tried[*b].errors.rms()))
@@ -254,7 +254,8 @@ impl Selection {
         Self { tried, chosen, least, excess }
     }
 
-    /// The same with laws under load or with memory only if their gain is clear.
+    /// Compares models with the permitted kinds of terms. Laws with load dependence or hysteresis are selected only if
+    /// they are clearly better.
     fn with_clear_gain(
         folds: &JointFolds,
         columns: &[CandidateColumn],
@@ -299,9 +300,9 @@ fn of_kind(columns: &[CandidateColumn], kind: FrictionKind) -> impl Iterator<Ite
     columns.iter().filter(move |column| column.kind == kind)
 }
 
-/// Limits of one joint's search.
+/// Limits of the search for one joint.
 pub(crate) struct SearchLimits<'a> {
-    /// Maximum variance inflation of separate Coulomb friction per direction.
+    /// Maximum variance inflation of Coulomb friction that differs by direction.
     pub(crate) max_inflation: f64,
     pub(crate) thresholds: &'a FrictionThresholds,
 }

@@ -1,22 +1,23 @@
 //! Second start values of friction constants.
 //!
-//! Gauss-Newton finds the local minimum near its start, and two starts are known to lie near the wrong minimum. A dry
-//! step (sign function) has no width that could change: it is the limit of a narrow step, and velocity noise can make
-//! it look best on a grid. (With Stribeck friction it is kept, because a separate Stribeck step would absorb the
-//! friction at rest.) And with a Coulomb step wider than half the Stribeck velocity, the two terms have exchanged their
-//! roles: the Stribeck term describes the step at rest.
+//! The Gauss-Newton method finds the local minimum near its start values. Two kinds of start values are known to be
+//! near the wrong minimum. First, the exact sign function has no width that could change. It is the limit of a narrow
+//! smoothed sign, and velocity noise can make it look best on a grid. (With Stribeck friction it is kept, because a
+//! separate smoothed sign of the Stribeck term would absorb the friction at rest.) Second, if the smoothed sign of
+//! Coulomb friction is wider than half the Stribeck velocity, the two terms have exchanged their roles: the Stribeck
+//! term then describes the sign change at rest.
 
 use super::candidates::JointScale;
 use super::constants::{is_coulomb, smooth_width, step_of, with_one_step};
 use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
-/// Ratio of Coulomb step width to that of the Stribeck term (half the Stribeck velocity) above which both terms have
-/// exchanged their roles.
+/// Ratio of the width of the Coulomb sign to that of the Stribeck term (half the Stribeck velocity) above which both
+/// terms have exchanged their roles.
 const MAX_WIDTH_RATIO: f64 = 2.0;
-/// Minimum ratio of Coulomb step width to that of the Stribeck term.
+/// Minimum ratio of the width of the Coulomb sign to that of the Stribeck term.
 const MIN_WIDTH_RATIO: f64 = 0.5;
 
-/// The same terms with the step near the other minimum; `None` if they already are.
+/// The same terms with constants near the other local minimum; `None` if they are already near it.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
     let step = step_of(terms.iter().find(|term| is_coulomb(term))?)?;
     let own_width = |term: &TorqueTerm| match term.kind().step_role() {
@@ -35,8 +36,8 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     Some(with_one_step(terms.iter().map(moved).collect()))
 }
 
-/// Whether Coulomb and Stribeck friction can be one friction. If the Coulomb step is far narrower than that of the
-/// Stribeck term, the joint is dry, and smooth Stribeck friction is overestimated.
+/// Whether Coulomb and Stribeck friction can be one friction. If the smoothed sign of Coulomb friction is far narrower
+/// than that of the Stribeck term, the joint has dry friction, and Stribeck friction with a wide sign is overestimated.
 pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
     let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
     match (width(is_coulomb), width(|term| matches!(term.kind().step_role(), StepRole::Own { .. }))) {

@@ -6,39 +6,39 @@ use super::joint_friction::JointFriction;
 /// Source of the joints' friction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum FrictionSource {
-    /// The terms of the robot.
+    /// The friction terms that the robot model states.
     #[default]
     Stated,
-    /// The terms of the robot, which other recordings selected. The error bars include the uncertainty of their
-    /// constants, as found by these recordings.
+    /// The terms of the robot model, which were selected from other recordings. The error bars include the uncertainty
+    /// of their constants according to the present recordings.
     SelectedBefore(Vec<JointFriction>),
-    /// Selected from the training logs for these joints; other joints keep the terms of the robot.
+    /// Selected from the training logs for these joints; other joints keep the terms of the robot model.
     Selected(Vec<FrictionSearch>),
 }
 
 impl FrictionSource {
-    /// The searches; empty without a selection.
+    /// Settings of the selection for each joint; empty without a selection.
     pub fn searches(&self) -> &[FrictionSearch] {
         if let Self::Selected(searches) = self { searches } else { &[] }
     }
 
-    /// The friction that other recordings selected; empty without it.
+    /// Friction that was selected from other recordings; empty if there is none.
     pub fn before(&self) -> &[JointFriction] {
         if let Self::SelectedBefore(before) = self { before } else { &[] }
     }
 
-    /// Whether the friction of a joint is selected from the training logs.
+    /// Whether the friction of any joint is selected from the training logs.
     pub fn is_selected(&self) -> bool {
         matches!(self, Self::Selected(_))
     }
 
-    /// The same source, except that the terms of the robot replace a selection.
+    /// The same source, but the terms of the robot model replace a selection.
     #[must_use]
     pub fn without_selection(self) -> Self {
         if self.is_selected() { Self::Stated } else { self }
     }
 
-    /// The same source with a change of every search.
+    /// The same source after every search is changed.
     #[must_use]
     pub fn with_searches(self, change: impl FnMut(FrictionSearch) -> FrictionSearch) -> Self {
         match self {
@@ -47,7 +47,7 @@ impl FrictionSource {
         }
     }
 
-    /// The same source with the searches that `keep` accepts.
+    /// The same source with only the searches that `keep` accepts.
     #[must_use]
     pub fn retaining(self, keep: impl FnMut(&FrictionSearch) -> bool) -> Self {
         match self {
@@ -60,7 +60,7 @@ impl FrictionSource {
     }
 }
 
-/// A selection for these joints; without joints the terms of the robot.
+/// Selects friction for these joints; without joints, the terms of the robot model are used.
 impl From<Vec<FrictionSearch>> for FrictionSource {
     fn from(searches: Vec<FrictionSearch>) -> Self {
         if searches.is_empty() { Self::Stated } else { Self::Selected(searches) }

@@ -1,11 +1,12 @@
-//! Friction terms that were selected on the grid but are insignificant with free constants.
+//! Test for friction terms that were selected with constants on a grid but are insignificant with free constants.
 //!
-//! A step whose width lies between two points of the grid looks like a further term there. After the constants are
-//! estimated together with all parameters, a further term must be significant: Wald's test, `xᵀ Σ⁻¹ x` against χ²,
-//! where x is its coefficient with the steps of its own constants, or for directional friction the difference of its
-//! two coefficients. Σ includes the uncertainty of all other parameters and constants. The rows must also contain the
-//! term: with Stribeck friction that decays below the slowest velocities of the rows, only its tail is visible, and the
-//! coefficient, the torque at rest, is arbitrary.
+//! If the true width of a smoothed sign lies between two grid points, the difference looks like an additional term.
+//! Therefore each additional term must remain significant after the constants are estimated together with all
+//! parameters. The test is Wald's test, `xᵀ Σ⁻¹ x` compared with χ². Here x is the coefficient of the term with the
+//! steps of its own constants, or for directional friction the difference of its two coefficients; the covariance Σ
+//! includes the uncertainty of all other parameters and constants. In addition, there must be rows in which the term
+//! acts. For example, if Stribeck friction decays below the slowest velocities of the rows, the rows contain only its
+//! tail, and its coefficient (the torque at rest) is arbitrary.
 
 use crate::thresholds::FrictionThresholds;
 use dynident_dynamics::Column;
@@ -14,11 +15,11 @@ use dynident_model::terms::{CandidateRole, TermAction, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
 struct FurtherTerm {
-    /// Wald statistic; 0 for negative friction or without supporting rows.
+    /// Wald statistic of the term; 0 for negative friction or without rows in which the term acts.
     wald: f64,
     degrees_of_freedom: usize,
     term: TorqueTerm,
-    /// The joint's terms without it.
+    /// Terms of the joint without this term.
     others: Vec<TorqueTerm>,
 }
 
@@ -28,12 +29,12 @@ impl FurtherTerm {
     }
 }
 
-/// Test of further terms in a fit.
+/// Test of additional terms in a fit.
 pub(super) struct TermTest<'a> {
     pub(super) columns: &'a [Column],
-    /// Norms of these columns over all rows.
+    /// Norms of the model's columns over all rows.
     pub(super) norms: &'a [f64],
-    /// Estimate of these columns and then of other unknowns.
+    /// Estimate of the parameters of these columns, followed by other unknowns.
     pub(super) estimate: &'a Estimate,
     pub(super) thresholds: FrictionThresholds,
 }
@@ -41,13 +42,13 @@ pub(super) struct TermTest<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Weak {
     Insignificant,
-    /// Only terms with negative friction or without supporting rows.
+    /// Only terms with negative friction or without rows in which they act.
     Unsupported,
 }
 
 impl TermTest<'_> {
-    /// Further terms among the terms of a joint. `own_constants` returns the columns of a term's constants in the
-    /// estimate, as steps from their current values.
+    /// Additional terms (beyond viscous and Coulomb friction) of a joint, with their tests. `own_constants` returns the
+    /// columns of a term's constants in the estimate, which are steps from their current values.
     fn further_terms(
         &self,
         terms: &[TorqueTerm],
@@ -74,7 +75,7 @@ impl TermTest<'_> {
             }
             term.candidate().filter(|law| law.role == CandidateRole::Addition)?;
             let left = without(&[term]);
-            // Reject terms with negative friction or without supporting rows.
+            // Rejects terms with negative friction or without rows in which they act.
             let fades = matches!(term.action(), TermAction::Friction(friction) if friction.fading.is_some());
             let is_shown = !fades || norms[own] * norms[own] >= thresholds.min_column_square_sum;
             if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
@@ -90,7 +91,7 @@ impl TermTest<'_> {
         terms.iter().filter_map(of).collect()
     }
 
-    /// The terms of a joint without the weakest further one; `None` if none is `weak`.
+    /// Terms of a joint without the weakest additional term; `None` if no additional term is `weak`.
     pub(super) fn without_weakest(
         &self,
         terms: &[TorqueTerm],
@@ -107,7 +108,7 @@ impl TermTest<'_> {
         is_weak.then_some(others)
     }
 
-    /// Whether a joint has possibly insignificant further terms that were not in its first selection, `before`.
+    /// Whether a joint has possibly insignificant additional terms that were not in its first selection, `before`.
     pub(super) fn has_doubtful_term(
         &self,
         terms: &[TorqueTerm],

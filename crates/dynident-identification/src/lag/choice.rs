@@ -1,11 +1,12 @@
-//! Selection of the lag to compensate: none, one for all joints, or separate lags of some joints.
+//! Selection of the torque lag to compensate: no lag, one lag for all joints, or separate lags of some joints.
 //!
-//! A lag of a recorder or a bus is the same for all joints, so the common lag is estimated first: the generalised mean
-//! of the joints' lags, with an error bar widened by the spread between joints beyond their own error bars (Paule and
-//! Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction or elasticity also looks like a lag, a different one in
-//! every joint; it widens the error bar and is not compensated. Joints get separate lags only after a common one was
-//! compensated, because friction that was selected with a lag in the rows absorbs a different part of it at each joint.
-//! An unknown lag changes the parameters by `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, which the error bars include.
+//! A lag of a recorder or a bus is the same for all joints, so a common lag is estimated first. It is the generalised
+//! mean of the joints' lags. If the lags differ by more than their error bars, the error bar of the mean is increased
+//! by this spread (Paule and Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction or elasticity also looks like a
+//! lag, but a different one in every joint; it increases the error bar and is not compensated. Joints get separate lags
+//! only after a common lag was compensated, because friction that was selected from rows with a lag absorbs a different
+//! part of the lag at each joint. The parameters θ depend on the lag δ with the sensitivity
+//! `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, so the error bars include the uncertainty of the lag.
 
 use super::fit::LagFit;
 use super::measured::TorqueLag;
@@ -15,55 +16,56 @@ use dynident_recording::log::OneOrMany;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Halvings of the interval of the spread between joints.
+/// Number of bisections for the spread between joints.
 const BISECTIONS: usize = 20;
 
-/// Kind of the compensated lag.
+/// Kind of lag that is compensated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LagKind {
-    /// None: no significant lag.
+    /// No lag, because there is no significant one.
     #[default]
     None,
-    /// One for all joints.
+    /// One lag for all joints.
     Common,
     /// Separate lags of some joints.
     Joints,
-    /// Stated by the study.
+    /// The lag that the study states.
     Stated,
 }
 
-/// The compensated lag and the remaining uncertainty.
+/// The compensated lag and the uncertainty that remains.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LagChoice {
-    /// Kind of the compensated lag.
+    /// Kind of lag that is compensated.
     pub kind: LagKind,
-    /// Compensated lag of each joint, s; empty if none.
+    /// Compensated lag of each joint, s; empty if no lag is compensated.
     pub lag_s: Vec<f64>,
-    /// Common lag of all joints and training logs, including a compensated common lag (for separate lags of joints,
-    /// only the rest); `None` if the logs do not determine it.
+    /// Lag that is common to all joints and training logs, including a compensated common lag (for separate lags of
+    /// joints, only the remaining lag); `None` if the logs do not determine it.
     pub common: Option<TorqueLag>,
-    /// χ² of the joints' lags about the common one, per degree of freedom; far above 1 if they differ.
+    /// χ² of the differences between the joints' lags and the common lag, per degree of freedom; far above 1 if the
+    /// joints have different lags.
     pub scatter: Option<f64>,
 }
 
 impl LagChoice {
-    /// Compensated lag for rows with the same settings:
-    /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s). `None` if nothing was
-    /// compensated.
+    /// Compensated lag in the form of
+    /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s), for other rows with the same
+    /// settings. `None` if nothing was compensated.
     pub fn taken_off(&self) -> Option<OneOrMany<f64>> {
         (!self.lag_s.is_empty()).then(|| OneOrMany::Many(self.lag_s.clone()))
     }
 
-    /// Largest compensated lag of a joint in either direction, s.
+    /// Largest magnitude of the compensated lags of all joints, s.
     pub fn longest_s(&self) -> f64 {
         self.lag_s.iter().fold(0.0, |longest, lag_s| longest.max(lag_s.abs()))
     }
 
-    /// Largest compensated lag of a joint in either direction, minus the half width of the 95 % interval of the common
-    /// lag, s. Zero if no lag was compensated or the interval includes zero.
+    /// Part of the compensated lag that is certain: the largest magnitude over the joints minus the half-width of the
+    /// 95 % interval of the common lag, s. Zero if no lag was compensated or the interval includes zero.
     pub fn certain_s(&self) -> f64 {
         let half_width_s = self.common.as_ref().map_or(0.0, |common| common.half_width_95_s);
         (self.longest_s() - half_width_s).max(0.0)
@@ -95,8 +97,8 @@ impl LagChoice {
     }
 }
 
-/// Selects the lag from a fit, in addition to the lag compensated before, `taken_off` (s, by joint, or empty).
-/// `estimate` contains the parameters that the lag must not disturb.
+/// Selects the lag from a fit. `taken_off` are the lags that were already compensated before this fit (s, by joint, or
+/// empty). `estimate` contains the parameters that an uncompensated lag must not change significantly.
 pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, candidates: LagCandidates) -> LagChoice {
     let dof = fit.joints.len();
     let before = |joint: usize| taken_off.get(joint).copied().unwrap_or(0.0);
@@ -125,7 +127,7 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
         return LagChoice { kind: LagKind::Common, lag_s: rest, ..choice };
     }
 
-    // Separate lags of joints, if they explain much of the residual and a common lag does not.
+    // Separate lags of joints are selected if they explain much of the residual and a common lag does not.
     let freedoms = all.len().saturating_sub(1) as f64;
     let is_scattered = scatter
         .is_some_and(|scatter| (scatter - 1.0) * freedoms > thresholds.max_scatter_std * (2.0 * freedoms).sqrt());
@@ -148,16 +150,17 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     choice
 }
 
-/// Effect of the lag's uncertainty on parameters and unknown gains, `S Σ_δ^½` with `S = ∂θ/∂δ`, for a common lag or for
-/// separate ones. Without a compensated lag, the prior uncertainty of lags bounds it. `None` for a stated lag. If
-/// joints cannot have separate lags (`candidates`), their spread stays in the rows and is part of the uncertainty.
+/// Effect of the lag's uncertainty on parameters and unknown gains: `S Σ_δ^½` with the sensitivity `S = ∂θ/∂δ` and the
+/// covariance Σ_δ of the lags, for a common lag or for separate lags. If no lag was compensated, the uncertainty is
+/// limited by the prior knowledge of lags. `None` for a stated lag. If joints cannot have separate lags (`candidates`),
+/// the spread of their lags remains in the rows and is part of the uncertainty.
 fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Option<DMatrix<f64>> {
     let answers = fit.answers();
     let usual = |std_s: f64| (std_s.powi(-2) + fit.usual_lag_s.powi(-2)).powf(-0.5);
     Some(match choice.kind {
         LagKind::Stated => return None,
         LagKind::Joints => {
-            // Errors of separate lags are independent.
+            // The errors of separate lags are independent.
             let std = |joint: &Option<TorqueLag>| joint.map_or(0.0, |lag| lag.std_s);
             let stds = DVector::from_iterator(fit.joints.len(), fit.joints.iter().map(std));
             answers * DMatrix::from_diagonal(&stds)
@@ -181,7 +184,7 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
     })
 }
 
-/// The covariance `S Σ_δ Sᵀ` that the error of the lags adds to an estimate.
+/// Covariance `S Σ_δ Sᵀ` that the error of the lags adds to an estimate (S: sensitivity, Σ_δ: covariance of the lags).
 pub(super) fn covariance_of_lag(
     fit: &LagFit,
     choice: &LagChoice,
@@ -198,7 +201,7 @@ pub(super) fn covariance_of_lag(
     Some(further)
 }
 
-/// Relative standard deviations of the unknown gains caused by the error of the lags.
+/// Relative standard deviations of the unknown gains that the error of the lags causes.
 pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
     let Some(half) = lag_error(fit, choice, LagCandidates::CommonOrJoints) else {
         return vec![0.0; fit.first - fit.parameters];
@@ -206,8 +209,8 @@ pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
     (fit.parameters..fit.first).map(|row| half.row(row).norm()).collect()
 }
 
-/// Joints whose lags are more precise than the prior, or all joints with a lag if there are none. A joint at rest only
-/// has a lag of its noise.
+/// Joints whose lags are more accurate than the prior; if there are none, all joints with a lag. The lag of a joint at
+/// rest is determined by noise only.
 fn informative_joints(fit: &LagFit) -> Vec<usize> {
     let lags = fit.joints.iter().enumerate().filter_map(|(joint, lag)| Some((joint, lag.as_ref()?)));
     let telling: Vec<usize> =
@@ -222,19 +225,20 @@ fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
 struct CommonLag {
     lag: TorqueLag,
     scatter: Option<f64>,
-    /// Standard deviation of the joints' lags about it beyond their own errors, s.
+    /// Standard deviation of the joints' lags around the common lag, beyond their own errors, s.
     spread_s: f64,
 }
 
-/// Common lag of some joints: the generalised mean with a spread τ between the joints in addition to their own errors,
-/// `χ²(τ) = n − 1` (Paule and Mandel, J. Res. NBS 87 (1982) 377). Unmodelled friction has one sign at all joints and
-/// does not average out, so the interval that decides about a lag includes the whole spread. The standard deviation,
-/// which widens the error bars of the parameters, is that of the mean.
+/// Common lag of some joints: the generalised mean of their lags, with a spread τ between the joints in addition to
+/// their own errors, from `χ²(τ) = n − 1` for n joints (Paule and Mandel, J. Res. NBS 87 (1982) 377). Unmodelled
+/// friction changes the lags of all joints with the same sign and does not average out. Therefore the interval that
+/// decides whether there is a lag includes the complete spread. The standard deviation, which increases the error bars
+/// of the parameters, is that of the mean.
 fn common(fit: &LagFit, joints: &[usize]) -> Option<CommonLag> {
     let lags: Vec<TorqueLag> = joints.iter().filter_map(|&joint| fit.joints[joint]).collect();
     let covariance = fit.covariance(joints);
     let values = DVector::from_iterator(lags.len(), lags.iter().map(|lag| lag.lag_s));
-    // With few segments the covariance of all joints can be singular.
+    // With few time segments, the covariance of all joints can be singular.
     let covariance = match covariance.clone().cholesky() {
         Some(_) => covariance,
         None => DMatrix::from_diagonal(&covariance.diagonal()),
@@ -243,7 +247,7 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<CommonLag> {
     let freedoms = lags.len().saturating_sub(1) as f64;
     let (mut spread, mut shared) = (0.0, alone);
     if alone.chi_square > freedoms && freedoms > 0.0 {
-        // χ² decreases with the spread, and is below n − 1 at the spread of the values themselves.
+        // χ² decreases with the spread τ. It is below n − 1 if τ is the spread of the values themselves.
         let mut bounds = [0.0, values.iter().fold(0.0_f64, |most, value| most.max((value - alone.mean).abs()))];
         bounds[1] *= (lags.len() as f64).sqrt();
         for _ in 0..BISECTIONS {

@@ -1,10 +1,11 @@
-//! Estimates lags and parameters together, from the samples of one or several logs.
+//! Estimation of torque lags together with the parameters, from the samples of one or several logs.
 //!
-//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column shifted by a quarter
-//! period is the viscous one), and wrong inertias of a prior look like a lag of many milliseconds. So lag and
-//! parameters are estimated together: `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t` with the torque taken `d` later, until `d`
-//! equals the lag `δ`. The covariance of the last step, from time segments, is that of the lag. It includes model
-//! errors (backlash, elasticity) as far as they differ between segments.
+//! A model that was fitted to late torque has absorbed a part of the lag: for a sine, the column of the inertia shifted
+//! by a quarter period equals the column of viscous friction. Conversely, wrong nominal inertias look like a lag of
+//! many milliseconds. Therefore the lag δ and the parameters θ are estimated together from
+//! `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t`, with the regressor Y and the torque τ taken `d` later. This is repeated
+//! until `d` equals δ. The covariance of the lag is that of the last step, computed from time segments. It includes
+//! model errors (backlash, elasticity) if they differ between segments.
 
 use super::measured::TorqueLag;
 use super::rows::{DelayRows, NODES, lagrange};
@@ -22,18 +23,19 @@ use rayon::prelude::*;
 
 /// Maximum number of steps; two to four are usual.
 const MAX_STEPS: usize = 12;
-/// Convergence: no lag moves by more than this ratio of its standard deviation, or by this number of samples.
+/// Convergence criterion: no lag changes by more than this ratio of its standard deviation, or by more than this number
+/// of samples.
 const CONVERGENCE: (f64, f64) = (0.02, 1.0e-6);
 
-/// Lags by joint, with the parameters estimated together with them.
+/// Lags of the joints, estimated together with the parameters.
 #[derive(Debug)]
 pub struct LagFit {
-    /// Parameters, unknown gains, then the change of each joint's lag in the last step, s.
+    /// Result of the last step: parameters, unknown gains, then the change of each joint's lag, s.
     pub(crate) last: Estimate,
-    /// Number of parameters: base parameters, payloads, offsets of single logs.
+    /// Number of parameters: base parameters, payloads, and offsets of single logs.
     pub(crate) parameters: usize,
     pub(crate) first: usize,
-    /// Lag of torque behind motion by joint; `None` if the samples do not determine it.
+    /// Time by which the torque of each joint is later than its motion; `None` if the samples do not determine it.
     pub(crate) joints: Vec<Option<TorqueLag>>,
     pub(crate) rows: Vec<usize>,
     pub(crate) usual_lag_s: f64,
@@ -46,8 +48,8 @@ impl LagFit {
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// Sensitivity of parameters and unknown gains to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, per second;
-    /// zero for a lag that the samples do not determine.
+    /// Sensitivity of parameters and unknown gains θ to the lag δ of each joint, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, per
+    /// second; zero for a lag that the samples do not determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
         let mut answers = DMatrix::zeros(self.first, self.joints.len());
@@ -64,7 +66,7 @@ impl LagFit {
         answers
     }
 
-    /// Share of the squared residual that a joint's own lag explains.
+    /// Share of the squared residual of a joint that a separate lag of this joint explains.
     pub(crate) fn share(&self, joint: usize) -> f64 {
         let Some(lag) = self.joints[joint] else { return 0.0 };
         let column = self.first + joint;
@@ -81,8 +83,8 @@ struct Samples<'a> {
     lag_s: Vec<f64>,
 }
 
-/// Fits the lags of the joints, common to all logs, with shared or separate noise of the logs. `None` for logs that are
-/// too short.
+/// Fits the lags of the joints, which are common to all logs. `noise` states whether logs have separate noise levels.
+/// `None` for logs that are too short.
 pub(crate) fn fit_lags(
     checks: &[DelayCheck<'_>],
     unknowns: Unknowns<'_>,
@@ -92,8 +94,8 @@ pub(crate) fn fit_lags(
     fitted(checks.first()?.model(), checks, unknowns, noise, with).ok()
 }
 
-/// Lags of one log by joint, including the lag compensated before; `None` if not determined. A lag matters if its rest
-/// does.
+/// Lags of the joints in one log, including lags that were compensated before; `None` if not determined. A lag is
+/// marked as significant if the uncompensated part is.
 pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSettings)) -> Vec<Option<TorqueLag>> {
     let joints = check.model().model().dof();
     let taken_off = &with.0.motion.torque_lag_s;
@@ -121,7 +123,7 @@ fn fitted(
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());
         checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-longest_s, longest_s)
     };
-    // Noisy logs get less weight for the lag too.
+    // Noisy logs also get less weight for the lag.
     let weighted = |problem: LinearProblem| match noise {
         LogNoise::Shared => Ok(problem),
         LogNoise::Own => weighted_by_log(settings, problem),
@@ -166,7 +168,7 @@ impl<'a> Samples<'a> {
         Ok(Self { checks, with, unknowns, rows, lag_s })
     }
 
-    /// Computes rows again if their nodes no longer surround the lag.
+    /// Computes the rows again if the lag is no longer between the samples (nodes) that they interpolate.
     fn follow(&mut self) -> Result<(), EstimationError> {
         for (check, rows) in self.checks.iter().zip(&mut self.rows) {
             for (joint, rows) in rows.iter_mut().enumerate() {
@@ -179,7 +181,7 @@ impl<'a> Samples<'a> {
         Ok(())
     }
 
-    /// The lag in `column` of the last step, if it converged below the maximum.
+    /// The lag in `column` of the last step; `None` if it did not converge or exceeds the maximum.
     fn joint_lag(&self, last: &Estimate, column: usize, longest_s: f64, fastest_hz: f64) -> Option<TorqueLag> {
         let joint = column - self.unknowns.count();
         let (rest, std) = (last.values[column], last.std[column]);
@@ -206,7 +208,8 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// Parameters and unknown gains, then the rest of every joint's lag, s.
+    /// Least-squares problem with the columns for parameters and unknown gains, then for the uncompensated lag of every
+    /// joint, s.
     fn problem(
         &self,
         factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
@@ -216,7 +219,7 @@ impl<'a> Samples<'a> {
         let (first, dof) = (self.unknowns.count(), self.lag_s.len());
         let names = (0..first + dof).map(|column| format!("column {column}")).collect();
         let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
-        // Undetermined parameters stay as fitted, because the slope was computed with them.
+        // Parameters that the rows do not determine keep their fitted values, because the slope was computed with them.
         let mut fallback = self.unknowns.values.to_vec();
         fallback.resize(first + dof, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;

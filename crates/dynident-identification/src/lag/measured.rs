@@ -1,4 +1,4 @@
-//! Lag of the torque behind the motion, with its error bar.
+//! Lag of the torque behind the motion (time by which the torque is late), with its error bar.
 
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
@@ -6,32 +6,34 @@ use serde::{Deserialize, Serialize};
 /// Lags and error bars below a picosecond are rounding errors.
 const MIN_STD_S: f64 = 1.0e-12;
 
-/// Lag of one joint's torque behind the motion.
+/// Time by which the torque of one joint is later than its motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueLag {
     /// Lag, s; negative if the torque is early.
     pub lag_s: f64,
-    /// Standard deviation, s.
+    /// Standard deviation of the lag, s.
     pub std_s: f64,
-    /// Half width of its 95 % interval, s; for a common lag of all joints including the whole spread between them.
+    /// Half-width of the 95 % interval of the lag, s. For a common lag of all joints, it includes the complete spread
+    /// between the joints.
     pub half_width_95_s: f64,
-    /// Whether the uncompensated part is outside of its interval and changes the torque by more than the residual.
+    /// Whether the uncompensated part of the lag is significant: zero is outside its interval, and it changes the
+    /// torque by more than the residual.
     pub matters: bool,
-    /// Part that was compensated before the fit, s.
+    /// Part of the lag that was compensated before the fit, s.
     #[serde(default)]
     pub taken_off_s: f64,
 }
 
 impl TorqueLag {
-    /// Adds a lag that was compensated before this rest was measured.
+    /// Adds a lag that was compensated before this remaining lag was measured.
     pub(crate) fn after(self, taken_off_s: f64) -> Self {
         Self { lag_s: taken_off_s + self.lag_s, taken_off_s, ..self }
     }
 }
 
-/// Common lag of several logs: the mean weighted by their variances. If logs differ by more than their error bars, the
-/// error bar grows accordingly (Birge, Phys. Rev. 40 (1932) 207).
+/// Common lag of several logs: the mean with inverse variances as weights. If logs differ by more than their error
+/// bars, the error bar grows accordingly (Birge, Phys. Rev. 40 (1932) 207).
 pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
     let weight = |lag: &TorqueLag| lag.std_s.max(MIN_STD_S).powi(-2);
     let total: f64 = lags.iter().map(weight).sum();
@@ -47,7 +49,7 @@ pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
     Some(TorqueLag { lag_s: mean, std_s, half_width_95_s, matters, taken_off_s })
 }
 
-/// Findings on significant lags.
+/// Findings about significant lags.
 pub fn delay_findings(lags: &[Option<TorqueLag>], joints: &[String]) -> Vec<Finding> {
     let of_joint = |(joint, lag): (&String, &Option<TorqueLag>)| {
         lag.filter(|lag| lag.matters || lag.taken_off_s != 0.0).map(|lag| {

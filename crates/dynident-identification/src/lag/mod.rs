@@ -1,5 +1,5 @@
-//! Lag between motion and torque with its error bar: estimated together with the parameters, selected (none, one for
-//! all joints, or separate ones), and compensated.
+//! Lag between motion and torque: estimated together with the parameters, selected (no lag, one lag for all joints, or
+//! separate lags), and compensated.
 
 mod choice;
 mod fit;

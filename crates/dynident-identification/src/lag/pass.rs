@@ -25,9 +25,10 @@ impl RowConsumer for DelayCheck<'_> {
 }
 
 /// Estimates the lags of the joints from all recordings `chosen`, in addition to the lag that the settings of `logs`
-/// compensate. `values` are the results of a fit over the `columns`: base parameters, payloads, offsets of single logs.
-/// Of the `gains` found with them, those that the logs determine are unknowns too. Recordings have separate noise if
-/// the settings require it. `None` if recordings are too short or rows inside a motion are excluded.
+/// compensate. `values` are the results of a fit with the unknowns in `columns`: base parameters, payloads, and offsets
+/// of single logs. `gains` are the torque gains of this fit; gains that the logs determine are estimated again together
+/// with the lags. Recordings have separate noise if the settings require it. `None` if recordings are too short or rows
+/// inside a motion are excluded.
 ///
 /// # Errors
 /// A recording cannot be read.
@@ -49,8 +50,9 @@ pub fn lag_fit(
     Ok(checks.and_then(|checks| fit_lags(&checks, unknowns, settings.log_noise, with)))
 }
 
-/// Complete lag of each joint, pooled over the recordings `chosen`. `theta` returns the base parameters of a recording.
-/// `None` for a joint that no recording determines, and if rows inside a motion are excluded.
+/// Total lag of each joint (compensated and remaining part), as a mean over the recordings `chosen`. `theta` returns
+/// the base parameters of a recording. `None` for a joint that no recording determines, and if rows inside a motion are
+/// excluded.
 ///
 /// # Errors
 /// A recording cannot be read.
@@ -69,7 +71,7 @@ pub fn lags_of_recordings(
     Ok((0..model.model().dof()).map(|joint| pooled_delay(&of_joint(joint))).collect())
 }
 
-/// Complete lag of each joint in recording `index`, after a pass with `check`.
+/// Total lag of each joint in recording `index`, after a pass that collected its samples in `check`.
 pub(crate) fn lags_after_pass(
     check: DelayCheck<'_>,
     with: (&Logs<'_>, &EstimationSettings),
@@ -81,7 +83,7 @@ pub(crate) fn lags_after_pass(
     }
 }
 
-/// Samples of the recordings `chosen`; `None` if one of them excludes rows.
+/// Collects the samples of the recordings `chosen`; `None` if one of them excludes rows.
 fn checks<'a>(
     logs: &Logs<'_>,
     model: &'a RegressorModel,
@@ -105,8 +107,8 @@ fn checks<'a>(
     logs.execution.try_map(&places, |&place| of_log(place)).map(Some)
 }
 
-/// The recording with every row, because excluded rows would shift the following ones. `None` if rows inside are
-/// unusable.
+/// The recording with all rows, because excluded rows would shift the following ones in time. `None` if rows inside the
+/// motion are unusable.
 fn whole(recording: &Recording) -> Option<Cow<'_, Recording>> {
     match &recording.samples {
         Samples::Log(_) => Some(Cow::Borrowed(recording)),

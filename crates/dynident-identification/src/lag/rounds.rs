@@ -1,4 +1,4 @@
-//! Repeated fits with compensation of the lag.
+//! Repetition of fit and lag estimation until the lag is compensated.
 
 use super::choice::{LagChoice, LagKind, choose_lag, covariance_of_lag};
 use super::fit::LagFit;
@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 
 const MAX_ROUNDS: usize = 3;
 
-/// Repeats fit and lag estimation until no significant lag is left in the rows. Begin with the default, fit without
-/// [`torque_lag_s`](Self::torque_lag_s), and continue while [`again`](Self::again) returns true.
+/// Repeats fit and lag estimation until no significant lag remains in the rows. Begin with the default value, fit with
+/// the lag in [`torque_lag_s`](Self::torque_lag_s) compensated, and continue while [`again`](Self::again) returns true.
 #[derive(Clone, Debug, Default)]
 pub struct LagRounds {
     candidates: LagCandidates,
@@ -19,7 +19,7 @@ pub struct LagRounds {
 }
 
 impl LagRounds {
-    /// Rounds with these candidate lags.
+    /// Starts with these candidate lags.
     pub fn of(candidates: LagCandidates) -> Self {
         Self { candidates, ..Self::default() }
     }
@@ -30,14 +30,14 @@ impl LagRounds {
         Self { choice, ..self }
     }
 
-    /// Lag to compensate in the next fit: for
+    /// Lag to compensate in the next fit, for
     /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s).
     pub fn torque_lag_s(&self) -> Option<OneOrMany<f64>> {
         self.choice.taken_off()
     }
 
-    /// Whether to fit again, now with compensation of the lag that `fit` found in the rows of `estimate`. `fit` is
-    /// `None` if the rows do not determine a lag.
+    /// Whether to fit again with the newly found lag compensated. `fit` is the lag in the rows of `estimate`, or `None`
+    /// if the rows do not determine a lag.
     pub fn again(&mut self, fit: Option<&LagFit>, estimate: &Estimate) -> bool {
         let Some(fit) = fit else { return false };
         let next = choose_lag(fit, &self.choice.lag_s, estimate, self.candidates);
@@ -51,13 +51,13 @@ impl LagRounds {
         false
     }
 
-    /// The covariance that the remaining uncertainty of the lag adds to `estimate`, after the last round. `None` if the
-    /// rows do not determine a lag, and for a stated lag.
+    /// Covariance that the remaining uncertainty of the lag adds to `estimate`, after the last fit. `None` if the rows
+    /// do not determine a lag, and for a stated lag.
     pub fn error(&self, fit: Option<&LagFit>, estimate: &Estimate) -> Option<DMatrix<f64>> {
         covariance_of_lag(fit?, &self.choice, self.candidates, estimate)
     }
 
-    /// The final selection.
+    /// The selected lag after the last fit.
     pub fn choice(self) -> LagChoice {
         self.choice
     }

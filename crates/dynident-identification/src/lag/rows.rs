@@ -1,15 +1,15 @@
-//! Rows for the estimation of a lag: regressor, slope of the predicted torque, and the torque at six neighbouring
-//! samples for interpolation.
+//! Rows for the estimation of a lag. A row contains the regressor, the time derivative of the predicted torque, and the
+//! torque at six neighbouring samples (nodes) between which it is interpolated.
 
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
 use dynident_rows::{JointRows, divide_by_coverage as divide};
 
-/// Samples used to interpolate the torque.
+/// Number of samples (nodes) for the interpolation of the torque.
 pub(crate) const NODES: usize = 6;
-/// Offset of the first node from the centre, samples.
+/// Index of the first node relative to the central sample.
 const FIRST_NODE: isize = -2;
-/// Samples that the slope needs on each side.
+/// Number of samples on each side that the time derivative needs.
 const SLOPE_REACH: isize = 2;
 
 pub(crate) struct Piece {
@@ -18,7 +18,7 @@ pub(crate) struct Piece {
     pub(crate) model: Vec<Vec<f64>>,
     /// Measured torque of each sample, by joint.
     pub(crate) measured: Vec<Vec<f64>>,
-    /// Indices of masked samples, ascending, by joint.
+    /// Indices of invalid samples, ascending, by joint.
     left_out: Vec<Vec<usize>>,
     /// Filtered regressor rows by joint.
     pub(crate) rows: Vec<Vec<FilteredRows>>,
@@ -26,7 +26,7 @@ pub(crate) struct Piece {
 
 pub(crate) struct FilteredRows {
     pub(crate) rows: usize,
-    /// Column-major.
+    /// Regressor, column-major.
     pub(crate) regressor: Vec<f64>,
     pub(crate) coverage: Vec<f64>,
 }
@@ -38,7 +38,7 @@ impl Piece {
         Self { segment, model: none(), measured: none(), left_out: vec![Vec::new(); joints], rows }
     }
 
-    /// Marks invalid samples among those added last.
+    /// Marks the invalid samples among the samples that were added last.
     pub(crate) fn leave_out(&mut self, joint: usize, set_aside: &[bool]) {
         let first = self.measured[joint].len() - set_aside.len();
         let marked = set_aside.iter().enumerate().filter(|(_, marked)| **marked);
@@ -46,18 +46,19 @@ impl Piece {
     }
 }
 
-/// One joint's filtered rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`. The last node has the place of a factor's torque.
+/// Filtered rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]` of one joint: regressor Y, time derivative of the predicted
+/// torque Yθ, and torque τ. The last node is in the column of the torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
     pub(crate) merged: SegmentedFactor,
-    /// The sample after which the lag lies, within one sample.
+    /// Index of the sample before the lag; the lag is at most one sample later.
     pub(crate) centre: isize,
-    /// Root mean square of the filtered slope, Nm (N) per sample.
+    /// Root mean square of the filtered time derivative of the torque, Nm (N) per sample.
     pub(crate) slope_rms: f64,
 }
 
 impl DelayRows {
-    /// Rows about a lag of `shift` samples; `columns` is the width of the regressor.
+    /// Computes the rows around a lag of `shift` samples; `columns` is the number of regressor columns.
     pub(crate) fn new(
         pieces: &[Piece],
         joint: usize,
@@ -102,13 +103,13 @@ impl DelayRows {
         Ok(Self { factor, merged, centre, slope_rms })
     }
 
-    /// Whether the nodes still surround a lag of `shift` samples.
+    /// Whether a lag of `shift` samples is still between the nodes.
     pub(crate) fn reaches(&self, shift: f64) -> bool {
         (-0.5..=1.5).contains(&(shift - self.centre as f64))
     }
 }
 
-/// Filtered slope and shifted torques, and the range of rows based on existing samples.
+/// Filtered time derivative of the torque, filtered shifted torques, and the range of rows for which all samples exist.
 struct LagColumns {
     rows: usize,
     values: Vec<f64>,
@@ -116,7 +117,8 @@ struct LagColumns {
 }
 
 impl LagColumns {
-    /// Computed from the predicted torque, the measured torque and the samples masked in the regressor.
+    /// Computes these columns from the predicted torque, the measured torque, and the indices of samples that are
+    /// invalid in the regressor.
     fn new(
         model: &[f64],
         measured: &[f64],
@@ -127,7 +129,7 @@ impl LagColumns {
     ) -> Self {
         let n = model.len() as isize;
         let at = |signal: &[f64], k: isize| usize::try_from(k).ok().and_then(|k| signal.get(k).copied()).unwrap_or(0.0);
-        // Differences of order four: the error is below 1 % at a tenth of the sample rate.
+        // Finite differences of fourth order: the error is below 1 % at a tenth of the sample rate.
         let slope =
             |k: isize| (8.0 * (at(model, k + 1) - at(model, k - 1)) - (at(model, k + 2) - at(model, k - 2))) / 12.0;
         let mut signals: Vec<f64> = (0..n).map(|k| -slope(k)).collect();
@@ -160,7 +162,8 @@ impl LagColumns {
     }
 }
 
-/// Weights of the six nodes for the value `x` samples after the centre: Lagrange polynomial of degree five.
+/// Weights of the six nodes for the value `x` samples after the central sample, by a Lagrange polynomial of degree
+/// five.
 pub(crate) fn lagrange(x: f64) -> [f64; NODES] {
     let node = |k: usize| (k as isize + FIRST_NODE) as f64;
     core::array::from_fn(|i| {

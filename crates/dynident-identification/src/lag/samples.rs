@@ -1,4 +1,4 @@
-//! Samples of a log for the estimation of its lags.
+//! Collection of the samples of a log for the estimation of its lags.
 
 use super::rows::{DelayRows, FilteredRows, Piece};
 use crate::estimators::EstimationSettings;
@@ -6,15 +6,15 @@ use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, Decimator, best_lag};
 use dynident_rows::{JointRows, Logs, RawSamples, RegressorModel, motion_band_hz, predicted_torque};
 
-/// Maximum number of samples: some tens of seconds of any log.
+/// Maximum number of samples; it is some tens of seconds of any log.
 pub(crate) const DELAY_SAMPLES: usize = 20_000;
-/// Samples of the low-passed signal per period of its cut-off for the correlation. A parabola through three of them
-/// finds a peak within a thousandth of the period.
+/// Number of samples per period of the cut-off frequency for the correlation of low-passed signals. A parabola through
+/// three of them gives the position of a peak within a thousandth of the period.
 const SAMPLES_PER_PERIOD: f64 = 20.0;
-/// Maximum number of values that are kept (64 MB).
+/// Maximum number of values that are kept in memory (64 MB).
 const MAX_KEPT_VALUES: usize = 8_000_000;
 
-/// Collects the first samples of a log and determines their lags.
+/// Collects the first samples of a log and estimates their lags.
 pub(crate) struct DelayCheck<'a> {
     model: &'a RegressorModel,
     theta: &'a [f64],
@@ -76,7 +76,8 @@ impl<'a> DelayCheck<'a> {
         self.rate_hz
     }
 
-    /// Start value, samples: the best match of prediction and torque, if a shift matters.
+    /// Start value of the lag, samples: the shift with the best match of predicted and measured torque, if a shift is
+    /// significant.
     pub(crate) fn coarse(&self, joint: usize, cutoff_hz: Option<f64>, longest_s: f64) -> Option<f64> {
         let piece = self.pieces.iter().max_by_key(|piece| piece.measured[joint].len())?;
         let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (SAMPLES_PER_PERIOD * hz)).clamp(1.0, 1000.0) as usize);

@@ -5,11 +5,12 @@ use nalgebra::DVector;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unknowns<'a> {
-    /// Values of the fit, in the order of the columns.
+    /// Values of the fit, in the order of its columns.
     pub(crate) values: &'a [f64],
-    /// Columns of payloads and offsets with the indices of the logs; `None` if the values are base parameters.
+    /// Columns of payloads and offsets of single logs, with the indices of the logs; `None` if the values are base
+    /// parameters.
     pub(crate) loads: Option<(&'a LoadColumns, &'a [usize])>,
-    /// Joints with an unknown relative error of the gain.
+    /// Joints whose torque gain has an unknown relative error.
     pub(crate) gains: &'a [usize],
 }
 
@@ -18,12 +19,13 @@ impl<'a> Unknowns<'a> {
         Self { values: theta, loads: None, gains: &[] }
     }
 
-    /// Number of columns before those of the lags: parameters, then gains.
+    /// Number of columns before the columns of the lags: parameters, then gains.
     pub(crate) fn count(&self) -> usize {
         self.values.len() + self.gains.len()
     }
 
-    /// Columns of the problem behind the columns `own` of a joint in log `place`, whose base parameters are `theta`.
+    /// Columns of the problem that act on a joint in log `place` through its regressor columns `own`. `theta` are the
+    /// base parameters of the log.
     pub(crate) fn seen(&self, place: usize, joint: usize, own: &[usize], theta: &[f64]) -> SeenColumns {
         let mut seen = match self.loads {
             Some((columns, logs)) => columns.seen(logs[place], own),

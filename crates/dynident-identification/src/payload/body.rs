@@ -1,4 +1,5 @@
-//! Payload as a body with mass, centre of mass and inertia, from an estimate, and the nearest consistent body.
+//! Payload as a body with mass, centre of mass and inertia: from an estimate, and the nearest physically consistent
+//! body.
 
 use super::columns::PayloadColumns;
 use dynident_estimation::consistent::{
@@ -8,14 +9,15 @@ use dynident_estimation::{Estimate, EstimationError, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
-/// Radius of gyration about the link's origin, m, of the reference body for undetermined parameters.
+/// Radius of gyration of the reference body about the link's origin, m; the reference body determines parameters that
+/// the logs do not.
 const GYRATION_RADIUS_M: f64 = 0.1;
-/// Relative tolerance of a known mass; an interior-point solver needs some room.
+/// Relative tolerance of a known mass; the interior-point solver cannot satisfy it exactly.
 const MASS_TOLERANCE: f64 = 1.0e-4;
 /// Minimum mass of the reference body, kg.
 const MIN_MASS_KG: f64 = 0.01;
-/// Minimum standard deviation relative to a body of this size. Noise-free logs would make the prior vanish in double
-/// precision.
+/// Minimum standard deviation relative to the values of a body of this size. With noise-free logs, the prior would
+/// otherwise be lost in rounding errors.
 const MIN_RELATIVE_STD: f64 = 1.0e-5;
 
 pub(crate) fn at_centre_of_mass(p: &[f64; 10]) -> [f64; 10] {
@@ -49,7 +51,7 @@ pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
 
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// Reason for a missing consistent body.
+/// Reason why there is no physically consistent body.
 #[derive(Debug, Error)]
 pub(crate) enum NoBodyError {
     /// The training logs hardly determine the payload, so that no body can be computed from its estimate. Record a
@@ -62,15 +64,16 @@ pub(crate) enum NoBodyError {
     Physical(#[from] PhysicalError),
 }
 
-/// The estimate of a payload as rows over its ten parameters, in units of their standard deviation.
+/// Estimate of a payload as rows of a least-squares problem for its ten parameters, scaled to unit noise.
 pub(crate) struct Determined {
     /// Name of the payload.
     pub(crate) name: String,
-    /// `L⁻¹ S B`: the determined parameters or sums `S B π` with covariance `L Lᵀ`, shape (determined, 10).
+    /// Matrix `L⁻¹ S B`, shape (determined, 10): `S B π` are the determined parameters, or sums of the parameters π,
+    /// and `L Lᵀ` is their covariance.
     pub(crate) rows: DMatrix<f64>,
-    /// `L⁻¹ x̂`.
+    /// Right side `L⁻¹ x̂` with the estimates x̂ of the determined parameters or sums.
     pub(crate) target: DVector<f64>,
-    /// Limits of the mass, if the study states it.
+    /// Minimum and maximum mass, if the study states the mass.
     pub(crate) mass_kg: Option<[f64; 2]>,
     mass: f64,
 }
@@ -83,7 +86,7 @@ impl Determined {
         let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
         let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(MIN_MASS_KG);
         let mass = known_mass.unwrap_or(estimated);
-        // Sum of both covariances, because one from few segments is singular.
+        // The covariance for white noise is added, because a covariance from few time segments is singular.
         let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
         let mut covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             entry(columns.first + places[i], columns.first + places[j])
@@ -96,7 +99,7 @@ impl Determined {
             };
             covariance[(i, i)] += (MIN_RELATIVE_STD * mass * length).powi(2);
         }
-        // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
+        // With the covariance V = L Lᵀ, the rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
         let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
         let values = DVector::from_iterator(places.len(), places.iter().map(|&place| value(place)));
         let (Some(white), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
@@ -108,7 +111,7 @@ impl Determined {
         Ok(Self { name: name.to_owned(), rows, target, mass_kg, mass })
     }
 
-    /// Estimates of all ten parameters with this covariance.
+    /// Rows for estimates of all ten parameters with this covariance.
     #[cfg(test)]
     pub(super) fn of_ten(values: &[f64; 10], covariance: DMatrix<f64>) -> Self {
         let lower = covariance.cholesky().unwrap().l();
@@ -116,7 +119,7 @@ impl Determined {
         Self { name: String::new(), rows: lower.try_inverse().unwrap(), target, mass_kg: None, mass: values[0] }
     }
 
-    /// All ten parameters with their covariance, if the logs determine them.
+    /// All ten parameters with their covariance; `None` if the logs do not determine them all.
     pub(crate) fn all_ten(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         if self.rows.nrows() < 10 {
             return None;
@@ -125,7 +128,8 @@ impl Determined {
         Some((&inverse * &self.target, &inverse * inverse.transpose()))
     }
 
-    /// The consistent body nearest to the estimate in the metric of its covariance.
+    /// The physically consistent body that is nearest to the estimate, with the distance weighted by the inverse
+    /// covariance.
     pub(crate) fn nearest_consistent_body(&self) -> Result<PhysicalFit, NoBodyError> {
         let count = self.rows.nrows();
         let panel: Vec<f64> = self.rows.as_slice().iter().chain(self.target.as_slice()).copied().collect();

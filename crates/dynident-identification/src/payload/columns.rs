@@ -1,9 +1,10 @@
-//! Columns in addition to the arm's parameters: payloads and offsets of single logs, and their effect on each log.
+//! Unknowns in addition to the arm's base parameters (payloads and offsets of single logs), and their effect on each
+//! log.
 //!
-//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of its body, and so `M π` with
-//! `M = B_body A` to the base parameters (`θ = B π_all`). So the regressor columns are those of the arm for every log:
-//! log ℓ has the base vector `θ_ℓ = T_ℓ x + c_ℓ`, where x contains all unknowns and c is a known payload.
-//! payload.
+//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of its body. With the matrix B
+//! of the base parameters (`θ = B π_all`), it adds `M π` with `M = B_body A` to the base parameters θ. Therefore every
+//! log has the same regressor columns, those of the arm. The base parameters of log ℓ are `θ_ℓ = T_ℓ x + c_ℓ`, where x
+//! contains all unknowns and c_ℓ is the effect of a known payload.
 
 use super::error::PayloadError;
 use super::refit::Refit;
@@ -15,22 +16,22 @@ use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use dynident_rows::{Recording, RegressorModel, Role, of_role};
 use nalgebra::{DMatrix, DVector};
 
-/// Relative tolerance below which a payload's parameter is a combination of earlier ones; the structure is accurate to
-/// about 1e-9.
+/// Relative tolerance below which a parameter of a payload is treated as a combination of earlier parameters; the
+/// structure is accurate to about 1e-9.
 const DEPENDENCE_TOLERANCE: f64 = 1.0e-6;
-/// Minimum coefficient of a dropped parameter in a sum.
+/// Minimum coefficient with which an omitted parameter is listed in a sum.
 const MIN_COEFFICIENT: f64 = 1.0e-9;
 
 /// A payload at a link of the robot. A [`Recording`] refers to it by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Payload {
-    /// Name used by recordings.
+    /// Name by which recordings refer to the payload.
     pub name: String,
-    /// Link to which it is fixed; its parameters are in the frame of this link.
+    /// Link to which the payload is fixed; its parameters are in the frame of this link.
     pub link: String,
-    /// Its ten inertial parameters if known; otherwise they are estimated.
+    /// Ten inertial parameters of the payload if they are known; otherwise they are estimated.
     pub known: Option<InertialParameters>,
-    /// Its mass if only the mass is known; the rest is estimated.
+    /// Mass of the payload if only the mass is known; the other parameters are estimated.
     pub known_mass_kg: Option<f64>,
 }
 
@@ -40,20 +41,21 @@ pub(crate) struct PayloadColumns {
     pub(crate) first: usize,
     pub(crate) kept: Vec<usize>,
     pub(crate) dropped: Vec<usize>,
-    /// Coefficients of dropped parameters in the kept ones, shape (kept, dropped).
+    /// Coefficients with which dependent (omitted) parameters are added to the kept ones, shape (kept, omitted).
     pub(crate) regrouping: DMatrix<f64>,
     /// Effect of the kept parameters on the base parameters, shape (base, kept).
     pub(crate) change: DMatrix<f64>,
-    /// Known mass, and its effect on the base parameters at the link's origin.
+    /// Known mass, and the effect of this mass at the link's origin on the base parameters.
     pub(crate) mass: Option<(f64, DVector<f64>)>,
 }
 
-/// Rows of one joint in one log, `W (T x + c)`, in terms of the problem's columns.
+/// Rows of one joint in one log, `W (T x + c)`, expressed in the columns of the problem: regressor W, unknowns x, and
+/// known payload c.
 pub(crate) struct SeenColumns {
     pub(crate) columns: Vec<usize>,
-    /// Rows of `T` for the joint's base columns.
+    /// Rows of the matrix T for the base columns of the joint.
     pub(crate) map: DMatrix<f64>,
-    /// `c` for the joint's base columns: a known payload.
+    /// Elements of c (known payload) for the base columns of the joint.
     pub(crate) known: DVector<f64>,
 }
 
@@ -64,21 +66,22 @@ impl SeenColumns {
     }
 }
 
-/// Columns of a problem: base parameters of the arm, then payloads, then offsets of single logs.
+/// Columns of a least-squares problem: base parameters of the arm, then payloads, then offsets of single logs.
 #[derive(Clone, Debug)]
 pub struct LoadColumns {
     base: usize,
     symbols: Vec<String>,
     pub(crate) payloads: Vec<PayloadColumns>,
-    /// (log, joint, column) of separate offsets.
+    /// Separate offsets as (log, joint, column).
     pub offsets: Vec<(usize, usize, usize)>,
-    /// `T_ℓ`, (base, columns), and `c_ℓ` of every log; `None` for the arm alone.
+    /// For every log, the matrix `T_ℓ` with shape (base, columns) and the vector `c_ℓ`; `None` for a log with the arm
+    /// alone.
     logs: Vec<Option<(DMatrix<f64>, Vec<f64>)>>,
 }
 
 impl LoadColumns {
-    /// Columns of a task, in terms of the columns of the model's layout. `known_arm` holds the arm and states which of
-    /// its parameters are fitted again.
+    /// Determines the columns for a task, based on the columns of the model's layout. If `known_arm` is given, the
+    /// arm's parameters are fixed, except those that it states to be fitted again.
     ///
     /// # Errors
     /// A payload or its link is missing, or settings are incompatible with payloads.
@@ -137,7 +140,8 @@ impl LoadColumns {
         if per_log(settings) {
             let joints = model.joint_names();
             let with_offset = |joint: &usize| model.terms().contains(&TorqueTerm::Offset(Offset { joint: *joint }));
-            // The last log's offsets are the negative sum of the others, so that the base parameters are the mean.
+            // The offsets of the last log are minus the sum of the others, so that the base parameters contain the
+            // mean.
             for &log in training.split_last().map_or(&[][..], |(_, rest)| rest) {
                 for joint in (0..model.model().dof()).filter(with_offset) {
                     offsets.push((log, joint, base + symbols.len()));
@@ -151,7 +155,7 @@ impl LoadColumns {
         Ok(columns)
     }
 
-    /// The arm's part of an estimate: base parameters only.
+    /// The part of an estimate that belongs to the arm: base parameters only.
     pub fn arm_estimate(&self, estimate: &Estimate) -> Estimate {
         let mut arm = estimate.clone();
         let base = self.base;
@@ -204,7 +208,7 @@ impl LoadColumns {
         Some((map, known))
     }
 
-    /// Whether all logs have the arm alone.
+    /// Whether all logs contain the arm without payloads and separate offsets.
     pub fn is_plain(&self) -> bool {
         self.logs.iter().all(Option::is_none)
     }
@@ -223,7 +227,7 @@ impl LoadColumns {
         model.layout().columns().iter().map(Column::symbol).chain(self.symbols.iter().cloned()).collect()
     }
 
-    /// `θ_ℓ = T_ℓ x + c_ℓ`: base parameters of a log.
+    /// Base parameters of a log, `θ_ℓ = T_ℓ x + c_ℓ`.
     pub fn base_values(&self, log: usize, x: &[f64]) -> Vec<f64> {
         match &self.logs[log] {
             None => x[..self.base].to_vec(),
@@ -243,25 +247,25 @@ impl LoadColumns {
         }
     }
 
-    /// `c_ℓ` over all columns: a known payload.
+    /// Effect c_ℓ of a known payload, over all columns.
     pub(crate) fn known(&self, log: usize) -> Vec<f64> {
         let mut known = self.logs[log].as_ref().map_or_else(|| vec![0.0; self.base], |(_, known)| known.clone());
         known.resize(self.count(), 0.0);
         known
     }
 
-    /// Columns of the problem that act on a joint in log `index` through its base columns `own`.
+    /// Columns of the problem that act on a joint in log `index` through the joint's base columns `own`.
     pub(crate) fn seen(&self, index: usize, own: &[usize]) -> SeenColumns {
         let Some((map, known)) = &self.logs[index] else { return SeenColumns::of_base(own) };
-        // Additional columns that do not act on the joint would be zero.
+        // Only additional columns that act on the joint; others would be zero.
         let further = (self.base..self.count()).filter(|&column| own.iter().any(|&row| map[(row, column)] != 0.0));
         let columns: Vec<usize> = own.iter().copied().chain(further).collect();
         let known = DVector::from_iterator(own.len(), own.iter().map(|&global| known[global]));
         SeenColumns { map: map.select_rows(own).select_columns(&columns), columns, known }
     }
 
-    /// Adds one joint's rows of a log to a problem over all columns. The torque of a known payload is subtracted unless
-    /// the joint's gain is unknown.
+    /// Adds the rows of one joint in a log to a problem with all columns. The torque of a known payload is subtracted,
+    /// unless the torque gain of the joint is unknown.
     pub(crate) fn add(
         &self,
         problem: &mut LinearProblem,
@@ -283,7 +287,7 @@ impl LoadColumns {
         problem.add(log, joint, columns, factor.mapped(&local)?)
     }
 
-    /// Rows for the arm alone, with all other columns at their estimates.
+    /// Rows for the arm alone: the torque of all other columns, at their estimated values, is subtracted.
     ///
     /// # Errors
     /// A problem with other columns.
@@ -311,7 +315,8 @@ impl LoadColumns {
 }
 
 impl PayloadColumns {
-    /// Parameters or sums of the columns, for example `Ixx + Iyy`, in the frame of the payload's link.
+    /// Expressions of the columns, in the frame of the payload's link: single parameters or sums, for example
+    /// `Ixx + Iyy`.
     pub(crate) fn expressions(&self) -> Vec<String> {
         let of_row = |(row, &kept): (usize, &usize)| {
             let further = self.dropped.iter().enumerate().filter_map(|(column, &dropped)| {
@@ -325,7 +330,7 @@ impl PayloadColumns {
         self.kept.iter().enumerate().map(of_row).collect()
     }
 
-    /// Whether kept parameter `row` is a single parameter.
+    /// Whether the kept parameter `row` is a single parameter and not a sum.
     pub(crate) fn alone(&self, row: usize) -> bool {
         self.regrouping.row(row).iter().all(|share| share.abs() <= MIN_COEFFICIENT)
     }
@@ -335,7 +340,7 @@ fn per_log(settings: &IdentificationSettings) -> bool {
     settings.offsets == OffsetChoice::PerLog
 }
 
-/// Rejects settings that are incompatible with payloads.
+/// Checks for settings that are incompatible with payloads.
 fn check(
     settings: &IdentificationSettings,
     recordings: &[Recording],
@@ -376,7 +381,8 @@ fn check(
     Ok(())
 }
 
-/// Column `place` of B, with zeros for columns of the layout that are not base parameters.
+/// Column `place` of the matrix B of the base parameters, with zeros for columns of the layout that are not base
+/// parameters.
 pub(crate) fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64> {
     let base = model.base();
     let mut column = DVector::zeros(rows);
@@ -388,7 +394,7 @@ pub(crate) fn base_column(model: &RegressorModel, place: usize, rows: usize) -> 
     column
 }
 
-/// M: effect of the ten parameters in the frame of `link` on the base parameters.
+/// Matrix M: effect of ten inertial parameters in the frame of `link` on the base parameters.
 fn change_of_base(model: &RegressorModel, link: &str) -> Result<DMatrix<f64>, PayloadError> {
     let bodies = model.model().bodies().iter().enumerate();
     let found = bodies.flat_map(|(body, b)| b.links.iter().map(move |link| (body, link))).find(|(_, l)| l.name == link);

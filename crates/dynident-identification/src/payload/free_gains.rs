@@ -1,23 +1,24 @@
-//! Gains as additional unknowns of fits to rows in newton metres.
+//! Torque gains as additional unknowns, for fits to rows that are already in newton metres.
 
 use super::gains::DriveGain;
 use dynident_estimation::{EstimationError, LinearProblem};
 use nalgebra::DMatrix;
 
-/// Joints with unknown gains that the logs determine.
+/// Joints whose unknown gains the logs determine.
 pub(crate) fn free_gains(gains: &[DriveGain]) -> Vec<usize> {
     (0..gains.len()).filter(|&joint| gains[joint].identified).collect()
 }
 
-/// Adds a column after all others for each of the joints `free`: the relative error κ of the joint's gain. From `u_j =
-/// W_j (θ + c)/g_j` follows, to first order about the fit θ̂ with the gain ĝ and `g_j = ĝ_j/(1 + κ_j)`,
+/// Adds a column after all others for each joint in `free`: the relative error κ_j of the joint's gain. The logged
+/// value of joint j is `u_j = W_j (θ + c)/g_j` with regressor W_j, base parameters θ, known payload c and gain g_j.
+/// With the fitted values θ̂ and ĝ_j, and `g_j = ĝ_j/(1 + κ_j)`, this gives to first order
 ///
 /// ```text
 ///     ĝ_j u_j − W_j c = W_j θ + κ_j W_j (θ̂ + c)
 /// ```
 ///
-/// The column is computed from the regressor, so it contains no torque noise. `known` is c of each log, and `values` is
-/// θ̂, over the columns of the problem.
+/// The column is computed from the regressor, so it contains no torque noise. `known` contains c for each log, and
+/// `values` is θ̂; both have the columns of the problem.
 ///
 /// # Errors
 /// The number of values is wrong.

@@ -1,4 +1,4 @@
-//! Effect of an error of stated drive gains on a payload.
+//! Effect of errors in the stated drive gains on an estimated payload.
 
 use super::columns::LoadColumns;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem};
@@ -7,10 +7,12 @@ use nalgebra::{DMatrix, DVector};
 /// Covariance that the error of the gains adds to the payloads of an estimate; `None` without payloads or without an
 /// error.
 ///
-/// An estimate is linear in torque, `x = Σ_j x_j`, where `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` is
-/// the part of joint j. A relative gain error ε_j scales x_j by `1 + ε_j`. The same error scales a held arm (`held`,
-/// found with the same gains), so its torque is subtracted first. With independent gains of standard deviation `share`
-/// the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
+/// The estimate x of a payload is linear in the torque: `x = Σ_j x_j`, where
+/// `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` is the contribution of joint j with torque τ_j, regressor
+/// W_j and noise σ_j. A relative gain error ε_j multiplies x_j by `1 + ε_j`. A known arm (columns `held`, values
+/// θ_held), which was identified with the same gains, has the same error, so its torque is subtracted first. If the
+/// gain errors of the joints are independent with the relative standard deviation `share`, the covariance of the
+/// payload grows by `share² Σ_j x_j x_jᵀ`.
 pub(crate) fn gain_error(
     problem: &LinearProblem,
     columns: &LoadColumns,

@@ -1,4 +1,4 @@
-//! Drive gains: newton metres per logged unit, from logs without and with a known payload.
+//! Drive gains (newton metres per logged unit), estimated from logs without and with a known payload.
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
@@ -7,27 +7,27 @@ use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, Lin
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// The drive gain of one joint.
+/// Estimated drive gain of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveGain {
     /// Name of the joint.
     pub joint: String,
-    /// Torque per logged unit, Nm (N): a factor for `torque.scale` of the format. If not identified, the value at which
-    /// it was held.
+    /// Torque per logged unit, Nm (N): a factor for `torque.scale` of the format. If the gain is not identified, the
+    /// value at which it was fixed.
     pub gain: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the gain.
     pub std: f64,
-    /// Half width of its 95 % interval.
+    /// Half-width of the 95 % interval of the gain.
     pub half_width_95: f64,
-    /// Whether the logs determine it.
+    /// Whether the logs determine the gain.
     pub identified: bool,
-    /// Reason if the logs do not determine it.
+    /// Reason why the logs do not determine the gain; `None` if they do.
     pub reason: Option<String>,
 }
 
 impl DriveGain {
-    /// Adds an error with standard deviation `share` relative to the gain.
+    /// Increases the uncertainty by an independent error with the relative standard deviation `share`.
     pub(crate) fn widen(&mut self, share: f64) {
         let further = (share * self.gain).abs();
         let wider = self.std.hypot(further);
@@ -40,7 +40,7 @@ impl DriveGain {
 
 pub(crate) struct Gains {
     pub(crate) of_joints: Vec<DriveGain>,
-    /// Over the columns of the problem, in SI units.
+    /// Estimate with the columns of the problem, in SI units.
     pub(crate) estimate: Estimate,
     /// The problem in newton metres, without the torque of known payloads.
     pub(crate) problem: LinearProblem,
@@ -58,7 +58,7 @@ pub(crate) fn known_loads(columns: &LoadColumns, training: &[usize]) -> Result<V
 }
 
 /// Estimates the torque per logged unit of each drive together with the dynamic parameters. The logged torque in `rows`
-/// includes that of the `known` payloads, which give the scale.
+/// includes the torque of the `known` payloads, which determines the scale.
 pub(crate) fn drive_gains(
     settings: &EstimationSettings,
     known: &[Vec<f64>],
@@ -105,7 +105,7 @@ fn in_newton_metres(rows: &LinearProblem, known: &[Vec<f64>], scale: &[f64]) -> 
     Ok(problem)
 }
 
-/// Removes the last columns; residuals are in newton metres.
+/// Removes the columns of the gains, which are the last ones; the residuals are converted to newton metres.
 fn without_gains(full: Estimate, count: usize, scale: &[f64]) -> Estimate {
     let mut estimate = full;
     estimate.names.truncate(count);

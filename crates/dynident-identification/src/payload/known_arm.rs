@@ -20,7 +20,8 @@ pub struct KnownArm {
 }
 
 impl KnownArm {
-    /// An arm with these base parameters and their covariance, identified with the motion cut-off `cutoff_hz`.
+    /// Creates an arm with these base parameters and their covariance. `cutoff_hz` is the cut-off of the positions in
+    /// the identification of the arm.
     ///
     /// # Errors
     /// The covariance has the wrong size.
@@ -36,12 +37,12 @@ impl KnownArm {
         Ok(Self { values, covariance, refit, cutoff_hz })
     }
 
-    /// Parameters of the arm that are fitted again.
+    /// Parameters of the arm that are fitted again together with the payload.
     pub fn refit(&self) -> Refit {
         self.refit
     }
 
-    /// Motion cut-off of the earlier identification.
+    /// Cut-off of the positions in the earlier identification.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.cutoff_hz
     }
@@ -55,7 +56,7 @@ impl KnownArm {
         (0..columns.base()).filter(is_held).collect()
     }
 
-    /// Estimates payloads, offsets per log and refitted parameters, with the arm held.
+    /// Estimates payloads, offsets per log and refitted parameters, with the other parameters of the arm fixed.
     pub(crate) fn estimate(
         &self,
         model: &RegressorModel,

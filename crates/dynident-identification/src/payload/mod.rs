@@ -1,4 +1,4 @@
-//! Differences between logs: payloads, offsets, gains; and payloads on a known arm.
+//! Differences between logs (payloads, offsets, gains), and payloads on a known arm.
 
 mod body;
 mod columns;

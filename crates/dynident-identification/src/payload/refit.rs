@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Refit {
-    /// Nothing.
+    /// No parameters.
     #[default]
     Nothing,
-    /// The joints' offsets.
+    /// The torque offsets of the joints.
     Offset,
-    /// Offsets and friction, which change with temperature from run to run.
+    /// Torque offsets and friction, which change with temperature from run to run.
     Friction,
 }

@@ -1,4 +1,4 @@
-//! Estimated payloads: values with error bars, and a consistent body.
+//! Estimated payloads: values with error bars, and a physically consistent body.
 
 use super::body::{Determined, NoBodyError, at_centre_of_mass, jacobian};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
@@ -18,18 +18,18 @@ pub struct PayloadParameter {
     pub expression: String,
     /// Unit.
     pub unit: String,
-    /// Estimate; zero if not excited.
+    /// Estimate; zero if the logs do not excite it.
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
     /// Half width of the 95 % interval.
     pub half_width_95: f64,
-    /// Whether the logs excite it.
+    /// Whether the logs excite the parameter or sum.
     pub excited: bool,
 }
 
-/// The physically consistent payload nearest to the estimate in the metric of its covariance. Undetermined parameters
-/// of it are not measured values.
+/// The physically consistent body that is nearest to the estimated payload, with the distance weighted by the inverse
+/// covariance. Values that the logs do not determine follow from physical consistency and a reference body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ConsistentPayload {
@@ -39,9 +39,9 @@ pub struct ConsistentPayload {
     pub com_m: [f64; 3],
     /// Inertia about the centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz.
     pub inertia_at_com_kgm2: [f64; 6],
-    /// Distance from the estimate, in standard deviations.
+    /// Distance of this body from the estimate, in standard deviations.
     pub moved_sigma: f64,
-    /// Whether the estimate is outside of the consistent set, so that the body is on its boundary.
+    /// Whether the estimate is not physically consistent, so that this body is on the boundary of the consistent set.
     pub on_the_boundary: bool,
 }
 
@@ -51,30 +51,30 @@ pub struct ConsistentPayload {
 pub struct PayloadResult {
     /// Name.
     pub name: String,
-    /// Link that defines the frame.
+    /// Link in whose frame the values are given.
     pub link: String,
     /// Training logs with this payload.
     pub logs: Vec<String>,
-    /// Estimates of its ten parameters about the link's origin, single or as sums.
+    /// Estimates of the payload's ten parameters about the link's origin, as single parameters or sums.
     pub parameters: Vec<PayloadParameter>,
-    /// Mass, kg, with a zero error bar if the study states it; `None` if not determined separately.
+    /// Mass, kg; with a zero error bar if the study states it; `None` if the logs do not determine it separately.
     pub mass_kg: Option<Measured>,
-    /// Centre of mass in the link's frame, m; `None` for coordinates that are not determined separately.
+    /// Centre of mass in the link's frame, m; `None` for coordinates that the logs do not determine separately.
     pub com_m: [Option<Measured>; 3],
-    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; `None` if not
-    /// determined separately.
+    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; `None` for values
+    /// that the logs do not determine separately.
     pub inertia_at_com_kgm2: [Option<Measured>; 6],
     /// Parameters that the logs do not determine, as sentences.
     pub not_identified: Vec<String>,
-    /// A consistent body.
+    /// The nearest physically consistent body; `None` if it could not be computed.
     pub possible: Option<ConsistentPayload>,
-    /// The body that `export` writes for a controller: as `possible`, with the values of a round body of the payload's
-    /// size as far as the error bars allow.
+    /// The body that `export` writes for a robot controller. Values that the logs do not determine are those of a
+    /// sphere of the payload's mass, as far as the error bars allow.
     #[serde(default)]
     pub controller: Option<ControllerPayload>,
-    /// Reason for a missing consistent body.
+    /// Reason why there is no physically consistent body.
     pub failure: Option<String>,
-    /// Effect on the base parameters, in their order; `validate` uses it for logs with this payload.
+    /// Change of each base parameter by the payload; `validate` uses it for logs with this payload.
     pub base_parameters_added: Vec<f64>,
 }
 
@@ -141,7 +141,7 @@ fn result(
     }
 }
 
-/// The consistent body nearest to the estimate, and the one for a controller.
+/// The physically consistent body that is nearest to the estimate, and the body for a controller.
 fn consistent_bodies(
     name: &str,
     columns: &PayloadColumns,
@@ -184,7 +184,8 @@ fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> 
     not_identified
 }
 
-/// Mass, centre of mass and inertia about it, if all contributing parameters are determined separately.
+/// Mass, centre of mass and inertia about the centre of mass; `None` for values that depend on parameters that are not
+/// determined separately.
 fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize) -> bool) -> [Option<Measured>; 10] {
     let place = |k: usize| {
         let place = columns.kept.iter().position(|&kept| kept == k)?;
@@ -200,7 +201,7 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
         (Some(i), Some(j)) => estimate.covariance[(i, j)],
         _ => 0.0,
     });
-    // The interval of a function of several parameters uses their largest quantile.
+    // The interval of a function of several parameters uses the largest quantile of these parameters.
     let width = places
         .iter()
         .flatten()

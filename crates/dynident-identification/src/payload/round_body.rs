@@ -1,9 +1,9 @@
-//! The body of a payload for a controller: values that the logs do not determine are those of a round body of the
-//! payload's size.
+//! Body of a payload for a robot controller. Values that the logs do not determine are those of a sphere with the
+//! payload's mass.
 //!
 //! A light payload hardly changes the torque, so the error bar of its inertia may be a hundred times its inertia. The
-//! physically consistent body nearest to the estimate then has an inertia of the size of the error bar. Here a sphere
-//! with the payload's mass is the prior of the inertia about the centre of mass.
+//! physically consistent body nearest to the estimate then has an inertia of the size of the error bar. To avoid this,
+//! a sphere with the payload's mass is used as the prior of the inertia about the centre of mass.
 
 use super::body::{Determined, NoBodyError, at_centre_of_mass};
 use super::measured::Measured;
@@ -14,21 +14,23 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Density of the sphere, kg/m³: that of packed boxes. Grippers and machined parts are denser, but long: their moments
-/// are above those of a sphere of their density. The moment of inertia changes with the power −2/3: a factor of 3 in
-/// density is a factor of 2.1 in inertia.
+/// Density of the sphere, kg/m³: that of packed boxes. Grippers and machined parts are denser but long, so that their
+/// moments of inertia are above those of a sphere of their density. For a given mass, the moment of inertia changes
+/// with the power −2/3 of the density: a factor of 3 in density is a factor of 2.1 in inertia.
 const DENSITY_KG_M3: f64 = 500.0;
-/// Standard deviation of the logarithm of the moment of the sphere: a factor of 2, which is a factor of 3 in density.
+/// Prior standard deviation of the logarithm of the sphere's moment of inertia: a factor of 2, which corresponds to a
+/// factor of 3 in density.
 const LOG_MOMENT_STD: f64 = 0.7;
-/// Searched range of the moment: this factor in both directions, and the number of steps in each.
+/// Search range for the moment of inertia: this factor in both directions.
 const MAX_MOMENT_FACTOR: f64 = 100.0;
+/// Number of steps of this search in each direction.
 const MOMENT_STEPS: i32 = 60;
-/// Standard deviation of the moments of inertia about that of the sphere, relative to it. A cuboid with edges 1:1:3 has
-/// moments of 0.27 and 1.36 times their mean.
+/// Prior standard deviation of the moments of inertia around the moment of the sphere, relative to the latter. For
+/// example, a cuboid with edges 1:1:3 has moments of 0.27 and 1.36 times their mean.
 const SHAPE_STD: f64 = 0.5;
-/// Number of times that the prior is weakened by a factor of two if it contradicts the logs.
+/// Maximum number of times that the prior is weakened by a factor of two if it contradicts the logs.
 const WEAKENINGS: usize = 6;
-/// Entries of the inertia: row and column.
+/// Row and column of each of the six entries of the inertia matrix.
 const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 /// Names and units of the ten values.
 const VALUES: [(&str, &str); 10] = [
@@ -54,11 +56,11 @@ pub struct ControllerPayload {
     pub com_m: [f64; 3],
     /// Inertia about the centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz.
     pub inertia_at_com_kgm2: [f64; 6],
-    /// Radius of the homogeneous sphere with the payload's mass that is the prior of the inertia, m.
+    /// Radius of the homogeneous sphere with the payload's mass, m. The sphere is the prior of the inertia.
     pub round_radius_m: f64,
     /// Moment of inertia of this sphere, kg m².
     pub round_moment_kgm2: f64,
-    /// The ten values, each with the 95 % interval of the logs.
+    /// The ten values, each with its 95 % interval from the logs.
     pub values: Vec<ControllerValue>,
 }
 
@@ -72,20 +74,21 @@ pub struct ControllerValue {
     pub unit: String,
     /// The value for the controller.
     pub value: f64,
-    /// The estimate from the logs alone; `None` if they do not determine it separately.
+    /// Estimate from the logs alone; `None` if the logs do not determine the value separately.
     pub estimate: Option<f64>,
     /// Half width of the 95 % interval of the estimate; zero for a stated mass.
     pub half_width_95: Option<f64>,
-    /// Lower end of that interval; at least zero for masses and moments.
+    /// Lower end of the 95 % interval; at least zero for masses and moments of inertia.
     pub lower_95: Option<f64>,
-    /// Upper end of that interval.
+    /// Upper end of the 95 % interval.
     pub upper_95: Option<f64>,
 }
 
-/// The body for a controller. `nearest` is the consistent body nearest to the estimate, its ten parameters about the
-/// origin; `figures` are the estimates of mass, centre of mass and inertia about it.
+/// Computes the body for a robot controller. `nearest` is the physically consistent body that is nearest to the
+/// estimate, as ten parameters about the origin. `figures` contains the estimates of mass, centre of mass and inertia
+/// about the centre of mass.
 ///
-/// With the mass m and the centre of mass of `nearest`, a sphere of density 500 kg/m³ has the radius
+/// A sphere of density ρ = 500 kg/m³ with the mass m and the centre of mass of `nearest` has the radius
 /// `r = (3 m / (4 π ρ))^(1/3)` and the moment `J = 2/5 m r²`. If the logs determine all ten parameters, J is the most
 /// probable moment for the estimated inertia Î with covariance V,
 ///
@@ -93,11 +96,12 @@ pub struct ControllerValue {
 /// max_J  N(Î; J 1, V + (J/2)² D) · N(ln J; ln J_ρ, 0.7²),   D = diag(1, ½, ½, 1, ½, 1)
 /// ```
 ///
-/// The body then minimises the squared distance from the estimate, in the metric of its covariance, plus that of its
-/// inertia from the sphere, `‖I − J 1‖²_F / (J/2)²`, over all physically consistent bodies. Both are errors in standard
-/// deviations, so a value with a small error bar is that of the logs, and a value with a large one that of the sphere
-/// (posterior mode of a linear Gaussian model; Gelman et al., Bayesian Data Analysis, 3rd ed., section 14.8; the choice
-/// of J is empirical Bayes, section 5.1). A value outside of the interval of the logs weakens the prior.
+/// Among all physically consistent bodies, the result minimises the sum of two squared distances: the distance from the
+/// estimate, weighted by its inverse covariance, and the distance of its inertia I from the sphere,
+/// `‖I − J 1‖²_F / (J/2)²`. Both are in units of standard deviations. Therefore a value with a small error bar is that
+/// of the logs, and a value with a large error bar is that of the sphere (posterior mode of a linear Gaussian model;
+/// Gelman et al., Bayesian Data Analysis, 3rd ed., section 14.8; the choice of J is empirical Bayes, section 5.1). If a
+/// value is outside of its interval from the logs, the prior is weakened.
 pub(super) fn controller_payload(
     data: &Determined,
     nearest: &[f64; 10],
@@ -142,23 +146,23 @@ fn one_value(k: usize, name: &str, unit: &str, value: f64, figure: Option<Measur
     }
 }
 
-/// Whether value number `k` cannot be negative: the mass and the moments of inertia.
+/// Whether value number `k` cannot be negative, which applies to the mass and the moments of inertia.
 fn is_positive(k: usize) -> bool {
     matches!(k, 0 | 4 | 7 | 9)
 }
 
-/// Interval of a value; the mass and the moments are not negative.
+/// The 95 % interval of a value; the lower end for the mass and the moments of inertia is at least zero.
 fn interval(k: usize, figure: &Measured) -> [f64; 2] {
     let [lower, upper] = [figure.value - figure.half_width_95, figure.value + figure.half_width_95];
     if is_positive(k) { [lower.max(0.0), upper.max(0.0)] } else { [lower, upper] }
 }
 
-/// Whether all values are in the intervals of the logs. An interval without a consistent value is ignored: the estimate
-/// is then further than its error bar from any physical body.
+/// Whether all values are within their intervals from the logs. An interval that contains no physically consistent
+/// value is ignored: the estimate is then further from any physical body than its error bar.
 fn is_inside(values: &[f64; 10], figures: &[Option<Measured>; 10]) -> bool {
     values.iter().zip(figures).enumerate().all(|(k, (&value, figure))| {
         let Some([lower, upper]) = figure.map(|figure| interval(k, &figure)) else { return true };
-        // A stated mass has an interval of zero width; a solver keeps it to 1e-4.
+        // A stated mass has an interval of zero width; the solver satisfies it to 1e-4.
         let slack = 1.0e-3 * value.abs();
         (is_positive(k) && upper <= 0.0) || (lower - slack..=upper + slack).contains(&value)
     })
@@ -170,8 +174,8 @@ fn sphere_moment(mass_kg: f64) -> f64 {
     0.4 * mass_kg * radius * radius
 }
 
-/// Rows that map ten parameters about the origin to the inertia about the point `c`: linear, and equal to the inertia
-/// about the centre of mass up to `m ‖com − c‖²`.
+/// Matrix that maps ten parameters about the origin to the inertia about the point `c`. This inertia is linear in the
+/// parameters, and differs from the inertia about the centre of mass by at most `m ‖com − c‖²`.
 fn inertia_about(c: [f64; 3]) -> DMatrix<f64> {
     let mut rows = DMatrix::zeros(6, 10);
     let square: f64 = c.iter().map(|c| c * c).sum();
@@ -187,8 +191,8 @@ fn inertia_about(c: [f64; 3]) -> DMatrix<f64> {
     rows
 }
 
-/// Standard deviation of an entry of the inertia relative to that of a moment, so that the prior does not depend on the
-/// axes: products appear twice in the Frobenius norm.
+/// Standard deviation of an entry of the inertia matrix relative to that of a moment of inertia. Products of inertia
+/// appear twice in the Frobenius norm; with this ratio, the prior does not depend on the axes.
 fn relative_std(row: usize) -> f64 {
     let (a, b) = ENTRIES[row];
     if a == b { 1.0 } else { core::f64::consts::FRAC_1_SQRT_2 }
@@ -199,7 +203,7 @@ fn is_moment(row: usize) -> f64 {
     f64::from(u8::from(a == b))
 }
 
-/// The most probable moment of the sphere; `None` unless the logs determine all ten parameters.
+/// The most probable moment of inertia of the sphere; `None` unless the logs determine all ten parameters.
 fn probable_moment(data: &Determined, about: &DMatrix<f64>, by_density: f64) -> Option<f64> {
     let (values, covariance) = data.all_ten()?;
     let (estimate, covariance) = (about * values, about * covariance * about.transpose());
@@ -219,7 +223,7 @@ fn probable_moment(data: &Determined, about: &DMatrix<f64>, by_density: f64) -> 
     costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, moment)| moment)
 }
 
-/// The consistent body with the least squared distance from the logs and from the sphere.
+/// The physically consistent body with the smallest sum of squared distances from the logs and from the sphere.
 fn shrunk(
     data: &Determined,
     (mass, com): (f64, [f64; 3]),

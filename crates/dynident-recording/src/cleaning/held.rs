@@ -1,40 +1,41 @@
-//! Finds torque that stays constant while its joint moves: repeated by a recorder, or clipped at the channel's range.
+//! Detection of torque that stays constant while its joint moves: a recorder repeated the value, or the value is
+//! clipped at the end of the channel's range.
 
 use super::CleaningSettings;
 use super::outliers::median_size;
 use crate::quantisation::{quantisation_step, usual_change};
 
-/// Maximum window on either side with which a run is compared, samples.
+/// Maximum number of samples on either side with which a run of equal values is compared.
 pub(super) const MAX_WINDOW: usize = 512;
 
-/// A run of one value, from `from` to `to` (exclusive).
+/// A run of equal values from sample `from` to sample `to` (exclusive).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     pub(super) from: usize,
     pub(super) to: usize,
-    /// Whether the value is an extreme of the channel; then the first sample is invalid too.
+    /// Whether the value is an extreme of the channel (saturated); then the first sample of the run is invalid, too.
     pub(super) saturated: bool,
 }
 
 impl Run {
-    /// Samples that were not measured; the first sample of a held (not saturated) run was measured.
+    /// The samples of the run that were not measured. The first sample of a held (not saturated) run was measured.
     pub(super) fn unmeasured(&self) -> core::ops::Range<usize> {
         self.from + usize::from(!self.saturated)..self.to
     }
 }
 
-/// Finds runs of one torque value in `tau` during which the position `q` moves, longer than quantisation explains: at
-/// least ten samples, and six times the longest run nearby, where the torque takes several values. A run at one of the
-/// `extremes` of the channel is saturated; other runs at an extreme are then ignored when the longest run nearby is
-/// determined. The peak of a smooth torque in quantisation steps is at most `2 / (√2 − 1) = 4.8` times as long as the
-/// adjacent step.
+/// Finds runs of equal torque values in `tau` during which the position `q` moves and which are longer than
+/// quantisation explains. A run must have at least ten samples and be six times as long as the longest run nearby,
+/// where the torque takes several values. A run at one of the `extremes` of the channel is saturated. For such a run,
+/// other runs at an extreme do not count as runs nearby. (The peak of a smooth torque in quantisation steps is at most
+/// `2 / (√2 − 1) = 4.8` times as long as the adjacent step.)
 pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2], limits: &CleaningSettings) -> Vec<Run> {
     let shortest = limits.held_samples;
     let mut held = Vec::new();
     let n = tau.len();
     let mut from = 0;
     while from + shortest <= n {
-        // Most samples differ from the one at the minimum run length, so compare with that one first.
+        // For most samples, the value at the minimum run length already differs. Comparing it first is fast.
         if tau[from] != tau[from + shortest - 1] || tau[from..from + shortest].iter().any(|value| *value != tau[from]) {
             from += 1;
             continue;
@@ -64,7 +65,7 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2], limits: &Cleani
         let mut current = 0;
         for k in 0..tau.len() {
             current = if k > 0 && tau[k] == tau[k - 1] { current + 1 } else { 1 };
-            // Saturation repeats, so other runs at an extreme are not a reference for the usual length.
+            // Saturation repeats, so other runs at an extreme do not show the usual length of runs.
             if !run.saturated || !extremes.contains(&tau[k]) {
                 longest = longest.max(current);
             }
@@ -73,7 +74,7 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2], limits: &Cleani
     let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
     let changes_enough = step.is_none_or(|step| median_size(changes.into_iter()) > limits.held_steps * step);
     let moved = q[run.from..run.to].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
-    // For back-and-forth motion, use the range, not the distance between the ends.
+    // For back-and-forth motion, the range of the positions is used, not the distance between the ends.
     let [low, high] = q[run.from..run.to]
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &q| [low.min(q), high.max(q)]);

@@ -1,16 +1,17 @@
-//! Fills holes in the rows that are short compared with the motion, and marks the filled rows.
+//! Interpolation of holes (missing rows) that are short compared with the motion; the filled rows are marked.
 
 use crate::clock::timeline::Places;
 use crate::log::RawBlock;
 
 const DEGREE: usize = 5;
-/// Minimum and maximum number of rows on either side from which a hole is filled.
+/// Minimum and maximum number of rows on either side that are used to fill a hole.
 const MIN_SIDE_ROWS: usize = 6;
 pub(super) const MAX_SIDE_ROWS: usize = 64;
 
 /// Values at `places` of the least-squares polynomial of degree 5 through `values` at `known`.
 ///
-/// The basis is orthonormal over `known`: two Gram-Schmidt passes on the powers, evaluated at `places` as well.
+/// The basis functions are orthonormal over `known`, by two Gram-Schmidt passes on the powers; they are also evaluated
+/// at `places`.
 fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
     let count = known.len();
     let middle = 0.5 * (known[0] + known[count - 1]);
@@ -77,7 +78,7 @@ fn empty_like(block: &RawBlock) -> RawBlock {
         ddq: none(&block.ddq),
         tau: none(&block.tau),
         temperature_c: none(&block.temperature_c),
-        // The motion of a log with torque does not use its commands.
+        // For a log with torque, the motion does not use commands.
         command: Vec::new(),
     }
 }
@@ -91,9 +92,9 @@ pub(super) struct Filled {
     pub(super) new_index: Vec<usize>,
 }
 
-/// Fills the holes of a block: positions by one polynomial of degree 5 through the rows on either side (twice the
-/// number of missing rows, 6 to 64), other channels by straight lines. A hole with too few rows next to it starts a new
-/// piece instead.
+/// Fills the holes of a block: positions by one polynomial of degree 5 through the rows on either side (on each side
+/// twice the number of missing rows, 6 to 64), other channels by straight lines. If there are too few rows next to a
+/// hole, the hole starts a new piece instead.
 pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
     let mut out = Filled {
         raw: empty_like(block),
@@ -129,7 +130,7 @@ pub(super) fn fill(before: &PastRows, block: &RawBlock, places: &Places, next: O
     out
 }
 
-/// The rows of one hole; `None` if too few rows are next to it.
+/// The rows that fill one hole; `None` if there are too few rows next to it.
 fn fill_hole(
     before: &PastRows,
     block: &RawBlock,
@@ -148,7 +149,8 @@ fn fill_hole(
     let missing = (to - from).round() as usize;
     let missing = missing.checked_sub(1).filter(|missing| *missing > 0)?;
     let wanted = (2 * missing).clamp(MIN_SIDE_ROWS, MAX_SIDE_ROWS);
-    // Uninterrupted rows on either side, nearest first; after the block's end, rows of the next block, evenly spaced.
+    // Uninterrupted rows on either side, nearest first. After the end of the block, rows of the next block are used;
+    // they are taken as evenly spaced.
     let is_seam = |k: usize| {
         let (_, places, k) = joined(k);
         places.begins[k] || places.holes.contains(&k)

@@ -1,8 +1,8 @@
-//! Cleans the rows of a log before a motion is made from them.
+//! Cleaning of the rows of a log, before velocities and accelerations are computed.
 //!
-//! [`CleanRows`] reads two blocks ahead. It finds single torque samples far from their neighbours (`outliers`) and
-//! torque that stays constant while its joint moves (`held`: repeated or saturated), and marks both so that no row of a
-//! fit uses them. It replaces single spikes of a position (`spikes`), assigns each row its place on the clock, and
+//! [`CleanRows`] reads two blocks ahead. It marks single torque samples that are far from their neighbours (`outliers`)
+//! and torque that stays constant while its joint moves (`held`: repeated or saturated), so that no row of a fit uses
+//! these samples. It replaces single spikes of a position (`spikes`), assigns each row its place on the clock, and
 //! fills and marks holes that are short compared with the motion (`holes`). The report lists these corrections.
 
 mod held;
@@ -27,7 +27,7 @@ use std::collections::VecDeque;
 pub(crate) struct CleanBlock {
     pub(crate) raw: RawBlock,
     pub(crate) places: Places,
-    /// For each joint the rows whose torque is ignored, ascending.
+    /// For each joint, the rows whose torque is ignored, ascending.
     pub(crate) marked: Vec<Vec<usize>>,
 }
 
@@ -35,17 +35,17 @@ pub(crate) struct CleanBlock {
 pub(crate) struct CleanRows {
     reader: RawBlocks,
     timeline: Timeline,
-    /// `None` keeps all samples.
+    /// Limits of the detection of invalid samples; `None` keeps all samples.
     limits: Option<CleaningSettings>,
     joints: usize,
-    /// Read, not cleaned.
+    /// The block that was read but not cleaned yet.
     waiting: Option<RawBlock>,
-    /// Cleaned, not placed.
+    /// Blocks that were cleaned but not placed on the clock yet.
     cleaned: VecDeque<(RawBlock, Vec<Vec<usize>>)>,
     ended: bool,
-    /// Last torques as logged and last positions as cleaned.
+    /// Last torques as logged, and last positions after cleaning.
     tail: [Vec<Vec<f64>>; 2],
-    /// Smallest and largest torque of each joint, and its spread.
+    /// Smallest and largest torque of each joint, and the difference of its 95 % and 5 % quantiles.
     extremes: Vec<[f64; 2]>,
     spread: Vec<f64>,
     before: PastRows,
@@ -77,7 +77,7 @@ impl CleanRows {
         }
     }
 
-    /// Reads rows ahead in a separate thread from now on.
+    /// Starts a separate thread that reads rows ahead.
     pub(crate) fn read_in_thread(self) -> Self {
         Self { reader: self.reader.in_thread(), ..self }
     }
@@ -90,12 +90,12 @@ impl CleanRows {
         self.tally.all()
     }
 
-    /// Number of filled holes, and of samples in them.
+    /// Number of filled holes, and of the samples in them.
     pub(crate) fn bridged(&self) -> [u64; 2] {
         self.bridged
     }
 
-    /// The next rows; `None` at the end. `read` is called with every block as logged.
+    /// The next cleaned rows; `None` at the end of the log. `read` is called with every block as logged.
     pub(crate) fn next_block(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<CleanBlock>, RecordingError> {
         while self.cleaned.len() < 2 && !(self.ended && self.waiting.is_none()) {
             let next = self.read(read)?;
@@ -147,7 +147,7 @@ impl CleanRows {
         let Some(limits) = &self.limits else { return (block, marked) };
         let next = self.waiting.as_ref();
         for (joint, marked) in marked.iter_mut().enumerate() {
-            // Positions first: the test for held torque uses them.
+            // Positions are cleaned first, because the test for held torque uses them.
             let joined = |tail: &[f64], own: &[f64], next: Option<&[f64]>, most: usize| -> Vec<f64> {
                 let ahead = next.map_or(&[][..], |next| &next[..next.len().min(most)]);
                 [tail, own, ahead].concat()

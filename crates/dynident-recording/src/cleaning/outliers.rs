@@ -1,40 +1,44 @@
-//! Finds single torque samples far from their neighbours.
+//! Detection of single torque samples that are far from their neighbours.
 
 use super::CleaningSettings;
 use crate::quantisation::quantisation_step;
 
-/// Samples per median.
+/// Number of samples in a group, of which the median is used.
 const GROUP: usize = 5;
-/// Samples needed on either side of a tested sample: two groups.
+/// Number of samples needed on either side of a tested sample: two groups.
 const REACH: usize = 2 * GROUP;
-/// Window over which the noise is taken as stationary, samples.
+/// Number of samples over which the noise is assumed stationary.
 pub(super) const NOISE_WINDOW: usize = 512;
-/// Factor on the minimum distance near an end of the log, where a line through ten samples is extrapolated.
+/// Factor on the minimum distance of an outlier near an end of the log, where a line through ten samples is
+/// extrapolated.
 const END_FACTOR: f64 = 4.0;
-/// Near an end, minimum ratio to the usual change between samples nearby (a settling controller oscillates).
+/// Minimum ratio of an outlier near an end of the log to the usual change between samples nearby. (A controller that
+/// settles there oscillates.)
 const END_CHANGE_RATIO: f64 = 2.0;
 const NEIGHBOURS: usize = 3;
-/// Maximum share of outliers that directly follow another one; above it they are pulses of the torque. The share is
-/// used only with at least the given number of outliers.
+/// Maximum share of outliers that directly follow another outlier. If the share is larger, the deviations are pulses of
+/// the real torque.
 const MAX_ADJACENT_SHARE: f64 = 0.2;
+/// Minimum number of outliers for which this share is used.
 const MIN_OUTLIERS_FOR_PULSES: usize = 10;
-/// Number of adjacent samples that form a pulse of the torque (a contact, a drive that catches up) if each deviates in
-/// the same direction by at least the given share of the tested sample.
+/// Number of adjacent samples that form a pulse of the real torque (a contact, a drive that catches up), if all deviate
+/// in the same direction.
 const PULSE_SAMPLES: usize = 3;
+/// Minimum deviation of each sample of a pulse, as a share of the deviation of the tested sample.
 const MIN_PULSE_SHARE: f64 = 0.25;
 pub(super) const MIN_SAMPLES: usize = 64;
 /// Ratio of the standard deviation to the median absolute deviation of normal noise.
 pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
 
-/// Indices of outliers in `own`, a range of `x`; the rest of `x` are its neighbours.
+/// Indices of the outliers in the range `own` of `x`; the rest of `x` are neighbouring samples.
 ///
-/// Two groups of five samples lie before and two after the tested sample; the median of a group tolerates two outliers.
-/// The cubic through the four medians estimates a smooth torque; the lines through the two medians before and the two
-/// after estimate the torque on either side of a step (friction reversal, contact). A sample is an outlier if it lies
-/// outside all of these by more than eight robust standard deviations of nearby samples from their cubics, 0.5 % of the
-/// torque's spread, and 3.5 steps of a quantised channel. Source of the median rule: Hampel, J. Am. Stat. Assoc. 69
-/// (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. The groups and the test for steps are this
-/// project's extensions.
+/// For each tested sample, the medians of two groups of five samples before it and of two groups after it are used; a
+/// median tolerates two outliers in its group. The cubic through the four medians estimates a smooth torque. The line
+/// through the two medians before, and the line through the two after, estimate the torque on either side of a step
+/// (friction reversal, contact). A sample is an outlier if its distance from the range of these three estimates exceeds
+/// three limits: eight robust standard deviations of the nearby samples from their cubics, 0.5 % of the torque's
+/// spread, and 3.5 steps of a quantised channel. Source of the median rule: Hampel, J. Am. Stat. Assoc. 69 (1974) 383;
+/// Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. The groups and the test for steps are extensions of Dynident.
 pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64, limits: &CleaningSettings) -> Vec<usize> {
     if x.len() < MIN_SAMPLES {
         return Vec::new();
@@ -46,7 +50,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64, lim
     if found.is_empty() || found.len() as f64 > limits.max_outlier_share * own.len() as f64 {
         return Vec::new();
     }
-    // Recorder errors are isolated; repeated deviations over several samples are torque.
+    // Errors of a recorder are isolated; repeated deviations over several samples are real torque.
     let beside = (1..found.len()).filter(|&k| found[k] == found[k - 1] + 1).count();
     if found.len() >= MIN_OUTLIERS_FOR_PULSES && beside as f64 > MAX_ADJACENT_SHARE * found.len() as f64 {
         return Vec::new();
@@ -58,26 +62,26 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64, lim
     found
 }
 
-/// Samples and the estimates of each sample from the medians of the groups around it.
+/// The samples, and for each sample the estimates from the medians of the groups around it.
 struct Surroundings<'a> {
     x: &'a [f64],
-    /// Medians of five successive samples, extrapolated at the ends.
+    /// Medians of five successive samples, extrapolated at the ends of the log.
     medians: Vec<f64>,
-    /// Distance of each sample from its cubic.
+    /// Distance of each sample from the cubic through the four medians.
     off: Vec<f64>,
 }
 
 struct FarSample {
     sample: usize,
-    /// Ratio of the distance to the minimum distance of an outlier.
+    /// Distance of the sample divided by the minimum distance of an outlier.
     times: f64,
 }
 
 impl<'a> Surroundings<'a> {
     fn of(x: &'a [f64]) -> Self {
         let n = x.len();
-        // The ends are extended by point reflection about the extrapolated line through the two inner groups. This
-        // preserves a slope, and the last sample, which may be an outlier, has no effect.
+        // The signal is extended at its ends by point reflection on the line through the two groups next to the end.
+        // This preserves a slope, and the last sample, which may be an outlier, has no effect.
         let end = |at: &dyn Fn(usize) -> f64| {
             let [near, far] =
                 [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
@@ -89,7 +93,7 @@ impl<'a> Surroundings<'a> {
         let padded: Vec<f64> = before.chain(x.iter().copied()).chain(behind).collect();
         let medians = padded.windows(GROUP).map(median_of_five).collect();
         let mut around = Self { x, medians, off: Vec::new() };
-        // The cubic through values at -8, -3, 3 and 8, at 0.
+        // Value at 0 of the cubic through values at -8, -3, 3 and 8.
         let smooth =
             |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
         around.off = (0..n).map(|i| x[i] - smooth(around.medians_around(i))).collect();
@@ -102,7 +106,7 @@ impl<'a> Surroundings<'a> {
         [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| self.medians[from])
     }
 
-    /// Signed distance of sample `k` outside the range of the estimates for sample `i`.
+    /// Signed distance of sample `k` from the range of the estimates for sample `i`; zero inside the range.
     fn signed(&self, i: usize, k: usize) -> f64 {
         let x = self.x;
         let usual = usual_range(self.medians_around(i), x[i] - self.off[i]);
@@ -113,8 +117,8 @@ impl<'a> Surroundings<'a> {
         self.signed(i, i).abs()
     }
 
-    /// Minimum distance of an outlier near an end, where only one side is known. It grows with the change between
-    /// samples, so that a signal that oscillates there has no outliers.
+    /// Minimum distance of an outlier near an end of the log, where samples are known on one side only. It grows with
+    /// the change between samples, so that an oscillating signal has no outliers there.
     fn least_at_an_end(&self, i: usize, least: f64) -> f64 {
         let n = self.x.len();
         if (REACH..n - REACH).contains(&i) {
@@ -137,7 +141,7 @@ impl<'a> Surroundings<'a> {
             let to = (from + half).min(own.end);
             let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
             let noise = f64::max(SIGMA_PER_MAD * median_size(off[low..high].iter().copied()), 0.5 * overall);
-            // If most samples lie on a line, the noise estimate is invalid; use the spread.
+            // If most samples lie exactly on a line, the noise estimate is invalid, and the spread is used instead.
             let share = if noise > 0.0 && !mostly_repeats { limits.outlier_spread_share } else { 2.0 };
             let least = f64::max(limits.outlier_noise_ratio * noise, share * spread).max(f64::MIN_POSITIVE);
             for i in from..to {
@@ -161,9 +165,9 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// Smallest power of two (at least 1) with more `distances` above it than between its half and itself. Distances are
-/// in units of the minimum distance of an outlier. Recorder errors are separated from the noise by a gap; noise with
-/// long tails has none.
+/// Limit above which distances are clearly separated from noise: the smallest power of two (at least 1) with more
+/// `distances` above it than between half of it and itself. Distances are in units of the minimum distance of an
+/// outlier. Errors of a recorder are separated from the noise by a gap; noise with long tails has no such gap.
 pub(super) fn gap_limit(distances: impl Iterator<Item = f64>) -> f64 {
     let distances: Vec<f64> = distances.collect();
     let mut limit = 1.0;
@@ -177,7 +181,7 @@ pub(super) fn gap_limit(distances: impl Iterator<Item = f64>) -> f64 {
     }
 }
 
-/// Range of the estimates at 0 from the medians at -8, -3, 3 and 8: the line through the first two, the line through
+/// Range of three estimates at 0 from the medians at -8, -3, 3 and 8: the line through the first two, the line through
 /// the last two, and the cubic through all.
 fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
     let [far, before, behind, beyond] = values;
@@ -186,7 +190,7 @@ fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
     low..suggested.iter().fold(f64::NEG_INFINITY, |high, value| high.max(*value))
 }
 
-/// Replaces the marked samples by the line between the nearest samples that are not marked.
+/// Replaces the marked samples by the straight line between the nearest unmarked samples.
 pub(super) fn interpolate_marked(x: &mut [f64], marked: &[usize]) {
     let mut at = 0;
     while at < marked.len() {
@@ -208,7 +212,7 @@ pub(super) fn interpolate_marked(x: &mut [f64], marked: &[usize]) {
 
 /// Median of the absolute values; zero without values.
 pub(super) fn median_size(values: impl Iterator<Item = f64>) -> f64 {
-    // The bits of nonnegative floats have the order of the floats and compare faster.
+    // The bit patterns of nonnegative floats have the same order as the floats, and they compare faster.
     let mut sizes: Vec<u64> = values.map(|value| value.abs().to_bits()).collect();
     if sizes.is_empty() {
         return 0.0;
@@ -220,7 +224,7 @@ pub(super) fn median_size(values: impl Iterator<Item = f64>) -> f64 {
 fn median_of_five(x: &[f64]) -> f64 {
     let (a, b) = (x[0].min(x[1]), x[0].max(x[1]));
     let (c, d) = (x[2].min(x[3]), x[2].max(x[3]));
-    // The smaller minimum and the larger maximum are not the median.
+    // The smaller of the two minima and the larger of the two maxima cannot be the median of five.
     let (low, high) = (a.max(c), b.min(d));
     low.min(high).max(low.max(high).min(x[4]))
 }

@@ -1,4 +1,4 @@
-//! Samples rejected from a log, with an example of each kind.
+//! Samples that were rejected from a log, with one example of each kind.
 
 use crate::log::{Quantity, RawBlock};
 use serde::{Deserialize, Serialize};
@@ -9,18 +9,19 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Reason {
-    /// Torque far from its neighbours: left out of torque and regressor.
+    /// The torque is far from its neighbours. The sample is excluded from torque and regressor.
     Outlier,
-    /// Torque that is repeated while its joint moves: left out of torque and regressor.
+    /// The torque is repeated while its joint moves. The sample is excluded from torque and regressor.
     Held,
-    /// Torque clipped at an extreme of its channel while its joint moves: left out of torque and regressor.
+    /// The torque is clipped at an extreme of its channel while its joint moves. The sample is excluded from torque and
+    /// regressor.
     Saturated,
-    /// Single position that deviates from its neighbours: replaced by the cubic through them.
+    /// A single position deviates from its neighbours. It is replaced by the cubic through the neighbours.
     Spike,
 }
 
 impl Reason {
-    /// Channel in which it is found.
+    /// Channel in which such samples occur.
     pub fn channel(self) -> Quantity {
         match self {
             Self::Outlier | Self::Held | Self::Saturated => Quantity::Torque,
@@ -28,7 +29,7 @@ impl Reason {
         }
     }
 
-    /// Code of its finding.
+    /// Code of the corresponding finding.
     pub(crate) fn code(self) -> &'static str {
         match self {
             Self::Outlier => "import-outliers",
@@ -51,11 +52,11 @@ pub struct RejectedSamples {
     pub reason: Reason,
     /// Number of samples.
     pub samples: u64,
-    /// Number of runs of a held or saturated torque; otherwise the number of samples.
+    /// Number of runs of held or saturated torque; otherwise the number of samples.
     pub places: u64,
-    /// Share of the rows used, 0 to 1.
+    /// Share of the rows that are used, 0 to 1.
     pub share: f64,
-    /// 0-based data row in the file of the sample that deviates most; for held or saturated torque, of the first
+    /// Data row in the file (from 0) of the sample that deviates most; for held or saturated torque, of the first
     /// sample.
     pub row: u64,
     /// Time of that row, in seconds after the first data row of the file.
@@ -104,7 +105,7 @@ impl Tally {
         Self { joints: joints.to_vec(), rows: 0, found: Vec::new() }
     }
 
-    /// Adds one sample of `block`: its value and the estimate from its neighbours.
+    /// Adds one sample of `block`. `values` are its value and the estimate from its neighbours.
     pub(super) fn add(
         &mut self,
         place: (usize, Reason),

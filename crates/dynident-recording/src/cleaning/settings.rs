@@ -5,41 +5,41 @@ use crate::error::{FilterError, require};
 /// Limits of the detection of outliers, spikes, held torque and holes. They are not part of a study file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CleaningSettings {
-    /// Minimum distance of a torque outlier in robust standard deviations; normal noise exceeds the default of 8 once
-    /// in 10¹⁵ samples.
+    /// Minimum distance of a torque outlier from its neighbours, in robust standard deviations. Normal noise exceeds
+    /// the default of 8 once in 10¹⁵ samples.
     pub outlier_noise_ratio: f64,
     /// Minimum distance of a torque outlier as a share of the spread of the torque, 0.005 by default; smaller outliers
     /// have no effect on a fit.
     pub outlier_spread_share: f64,
     /// Minimum distance of a torque outlier in steps of a quantised channel, 3.5 by default.
     pub outlier_steps: f64,
-    /// Minimum ratio of a torque outlier to the usual distance of its nearest neighbours, 5 by default: in a peak over
-    /// several samples they deviate as well.
+    /// Minimum ratio of a torque outlier's distance to that of its nearest neighbours, 5 by default. (In a real peak
+    /// over several samples, the neighbours deviate as well.)
     pub outlier_neighbour_ratio: f64,
-    /// Maximum share of torque outliers, 0.15 by default; above it the deviations belong to the signal.
+    /// Maximum share of torque outliers, 0.15 by default; if the share is larger, the deviations belong to the signal.
     pub max_outlier_share: f64,
     /// Minimum size of a position spike in robust standard deviations of the fourth difference, 12 by default.
     pub spike_noise_ratio: f64,
     /// Minimum size of a position spike in steps of a quantised encoder, 3.5 by default.
     pub spike_steps: f64,
-    /// Maximum share of position spikes, 0.05 by default; above it the deviations belong to the signal.
+    /// Maximum share of position spikes, 0.05 by default; if the share is larger, the deviations belong to the signal.
     pub max_spike_share: f64,
-    /// Minimum number of samples in a run of held torque, 10 by default.
+    /// Minimum number of samples in a run of held (repeated) torque, 10 by default.
     pub held_samples: usize,
-    /// Minimum ratio of a held run to the longest run of one torque nearby, 6 by default.
+    /// Minimum ratio of the length of a held run to the longest run of equal torque values nearby, 6 by default.
     pub held_run_ratio: usize,
-    /// Minimum number of changes of the torque near a held run, 6 by default: a nearly constant torque repeats because
-    /// of its quantisation.
+    /// Minimum number of changes of the torque near a held run, 6 by default. (A nearly constant torque repeats because
+    /// of its quantisation.)
     pub held_changes_nearby: usize,
     /// Minimum motion during a held run as a share of the motion nearby over the same number of samples, 0.1 by
     /// default.
     pub held_motion_share: f64,
-    /// Minimum motion during a held run in steps of a quantised encoder, and minimum usual change of a quantised torque
-    /// over the length of the run, 4 by default.
+    /// Minimum motion during a held run in steps of a quantised encoder; also the minimum usual change of a quantised
+    /// torque over the length of the run, in steps. 4 by default.
     pub held_steps: f64,
-    /// Maximum length of a filled hole in periods of the cut-off, 0.2 by default: a tenth of the period of the motion's
-    /// highest frequency. A polynomial of degree 5 through both sides has an error below 1e-4 for a sinusoid of that
-    /// frequency.
+    /// Maximum length of a hole that is filled, in periods of the cut-off frequency, 0.2 by default. This is a tenth of
+    /// the period of the motion's highest frequency; a polynomial of degree 5 through both sides then has an error
+    /// below 1e-4 for a sinusoid of that frequency.
     pub hole_periods: f64,
 }
 
@@ -90,7 +90,7 @@ impl CleaningSettings {
         {
             require((0.0..=1.0).contains(&value), name, value, "give 0 to 1")?;
         }
-        // A run of one sample is never held, and a shorter window around a run has no neighbours.
+        // A run of one sample is never held, and a shorter window around a run would contain no neighbours.
         let fix = "give 2 to 100 samples";
         require((2..=100).contains(&self.held_samples), "held_samples", self.held_samples as f64, fix)
     }

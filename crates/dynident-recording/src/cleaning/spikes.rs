@@ -1,35 +1,36 @@
-//! Finds and replaces single positions that no motion can cause.
+//! Detection and replacement of single positions that no motion can cause.
 
 use super::CleaningSettings;
 use super::outliers::{MIN_SAMPLES, NOISE_WINDOW, SIGMA_PER_MAD, gap_limit, median_size};
 use crate::quantisation::{quantisation_step, usual_change};
 
 const REACH: usize = 4;
-/// Maximum RMS deviation of the fourth differences around a spike from the pattern of a spike, as a share of the
-/// largest; for a kink it is a sixth.
+/// Maximum RMS deviation of the fourth differences around a spike from the pattern of an ideal spike, relative to the
+/// largest fourth difference. For a kink in the motion it is a sixth.
 const MAX_PATTERN_ERROR: f64 = 0.08;
-/// The same limit where three standard deviations of the noise exceed it.
+/// The same limit for small spikes, for which three standard deviations of the noise exceed the normal limit.
 const MAX_PATTERN_ERROR_IN_NOISE: f64 = 0.14;
 
-/// Replaces single spikes of `own` (a range of `x`) by the cubic through their four neighbours and returns their
+/// Replaces single spikes in the range `own` of `x` by the cubic through their four neighbours, and returns their
 /// indices.
 ///
-/// The fourth difference of a spike A is `A (1, -4, 6, -4, 1)`, of a jump `A (1, -3, 3, -1)`, of a kink `A (1, -2, 1)`.
-/// This pattern distinguishes a spike from a jump of the angle or a sudden acceleration. Its size must exceed twelve
-/// robust standard deviations of the fourth differences nearby.
+/// The fourth differences around a spike of size A are `A (1, -4, 6, -4, 1)`, around a jump `A (1, -3, 3, -1)`, and
+/// around a kink `A (1, -2, 1)`. This pattern distinguishes a spike from a jump of the angle and from a sudden
+/// acceleration. The size must exceed twelve robust standard deviations of the fourth differences nearby.
 pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>, limits: &CleaningSettings) -> Vec<usize> {
     let n = x.len();
     if n < MIN_SAMPLES {
         return Vec::new();
     }
     let fourth = |x: &[f64], i: usize| {
-        // Differences of differences keep the digits of positions far from zero.
+        // Repeated differences keep the digits of positions that are far from zero.
         let d = [x[i - 1] - x[i - 2], x[i] - x[i - 1], x[i + 1] - x[i], x[i + 2] - x[i + 1]];
         (d[3] - d[2]) - 2.0 * (d[2] - d[1]) + (d[1] - d[0])
     };
     let all: Vec<f64> = (2..n - 2).map(|i| fourth(x, i)).collect();
     let overall = SIGMA_PER_MAD * median_size(all.iter().copied());
-    // Index, size, ratio to the minimum size, and whether the pattern is that of a spike.
+    // For each candidate its index, its size, the ratio to the minimum size, and whether the pattern is that of a
+    // spike.
     let mut apart: Vec<(usize, f64, f64, bool)> = Vec::new();
     let inside = own.start.max(REACH)..own.end.min(n - REACH);
     let half = NOISE_WINDOW / 2;
@@ -58,7 +59,7 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>, limits
         }
         from = to.max(from + 1);
     }
-    // Other roughness of the same size indicates noise with long tails, not spikes.
+    // If other roughness has the same size, it is noise with long tails and not a spike.
     let limit = gap_limit(apart.iter().map(|(_, _, times, is_lone)| if *is_lone { *times } else { times.min(1.0) }));
     let lone = apart.into_iter().filter(|(_, _, times, is_lone)| *is_lone && *times > limit);
     let mut found: Vec<(usize, f64)> = lone.map(|(i, size, ..)| (i, size)).collect();

@@ -1,22 +1,22 @@
-//! Time stamps that jitter about a slowly varying rate: local lines through them, and their drift from an even grid.
+//! Time stamps that jitter around a slowly varying rate: smoothing by local lines, and their drift from an even grid.
 
 use super::settings::ClockSettings;
 
-/// Half widths of the windows that are tried, rows.
+/// Half-widths of the smoothing windows that are tried, rows.
 const HALF_WIDTHS: [usize; 10] = [4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048];
-/// A longer window is accepted while its error for left-out stamps is within this factor of the minimum.
+/// A longer window is accepted if its prediction error for left-out stamps is within this factor of the minimum.
 const MAX_ERROR_RATIO: f64 = 1.05;
-/// Rows on either side of a jump that must show that it lasts.
+/// Number of rows on either side of a jump of the stamps that must show that the jump is permanent.
 const JUMP_ROWS: usize = 8;
-/// Minimum jump that indicates missing rows, steps.
+/// Minimum jump of the stamps that indicates missing rows, steps.
 const MIN_JUMP_STEPS: f64 = 0.6;
 
-/// Rows needed on either side of a block to smooth the block's stamps.
+/// Number of rows that are needed on either side of a block to smooth its stamps.
 pub(crate) const CONTEXT_ROWS: usize = HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 2 * JUMP_ROWS;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drift {
-    /// Half width of the local lines, rows.
+    /// Half-width of the local lines, rows.
     pub(crate) half: usize,
     /// Range of the deviations of the smoothed stamps from the even grid, steps.
     pub(crate) steps: f64,
@@ -24,7 +24,7 @@ pub(crate) struct Drift {
     pub(crate) variation: f64,
 }
 
-/// Candidate half widths, rows: the longest window with nearly the minimum error for left-out stamps, and all longer
+/// Half-widths to try, rows: the longest window whose error for left-out stamps is nearly the minimum, and all longer
 /// windows. Empty for fewer than 64 rows.
 pub(crate) fn windows(place: &[f64], stamp: &[f64], begins: &[bool]) -> &'static [usize] {
     if place.len() < 64 {
@@ -33,14 +33,14 @@ pub(crate) fn windows(place: &[f64], stamp: &[f64], begins: &[bool]) -> &'static
     let begins = with_jumps(place, stamp, begins);
     let errors: Vec<f64> = HALF_WIDTHS.iter().map(|half| left_out_error(place, stamp, &begins, *half)).collect();
     let least = errors.iter().fold(f64::INFINITY, |least, error| least.min(*error));
-    // Exact stamps have zero error for any window, hence the floor of a millionth of a step.
+    // Exact stamps have zero error for any window, so a millionth of a step is always accepted.
     let allowed = (MAX_ERROR_RATIO * least).max(1e-6);
     &HALF_WIDTHS[errors.iter().rposition(|error| *error <= allowed).unwrap_or(HALF_WIDTHS.len())..]
 }
 
 impl Drift {
-    /// Drift of rows `place` (row numbers) with stamps `stamp` (in steps), smoothed by local lines of half width
-    /// `half`; `begins` marks the first row of each piece. Needs at least two rows.
+    /// Drift of the rows `place` (row numbers) with the stamps `stamp` (in steps), smoothed by local lines of
+    /// half-width `half`. `begins` marks the first row of each piece. Needs at least two rows.
     pub(crate) fn of(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> Self {
         let begins = with_jumps(place, stamp, begins);
         let smooth = smoothed_runs(place, stamp, &begins, half);
@@ -58,7 +58,7 @@ impl Drift {
             square += ((smooth[i] - smooth[i - span]) / rows - 1.0).powi(2);
             count += 1.0;
         }
-        // Jumps within a piece are missing rows, where the rate of an even grid is wrong by the whole step.
+        // Jumps within a piece are missing rows. There the rate of an even grid is wrong by the whole jump.
         let jumps =
             (1..place.len()).filter(|&i| begins[i]).map(|i| stamp[i] - stamp[i - 1] - (place[i] - place[i - 1]));
         let jumps: f64 = jumps.filter(|jump| jump.abs() < JUMP_ROWS as f64).map(|jump| jump * jump).sum();
@@ -71,15 +71,15 @@ impl Drift {
     }
 }
 
-/// The stamps smoothed by local lines of half width `half`, separately for each piece and between lasting jumps
+/// The stamps, smoothed by local lines of half-width `half`, separately for each piece and between permanent jumps
 /// (missing rows).
 pub(crate) fn smoothed(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> Vec<f64> {
     smoothed_runs(place, stamp, &with_jumps(place, stamp, begins), half)
 }
 
-/// Deviation of stamps from the grid of one step per row, piece by piece.
+/// Deviation of stamps from an even grid of one step per row, separately for each piece.
 fn off_grid(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<f64> {
-    // Jumps are part of the drift; a new grid starts at gaps and at stamps that go backwards.
+    // Jumps are part of the drift. Gaps and stamps that go backwards start a new grid.
     let mut off: Vec<f64> = place.iter().zip(stamp).map(|(place, stamp)| stamp - place).collect();
     let mut shift = 0.0;
     for i in 0..off.len() {
@@ -91,14 +91,14 @@ fn off_grid(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<f64> {
     off
 }
 
-/// Starts of pieces, with lasting jumps added.
+/// Starts of pieces, including the rows after permanent jumps.
 fn with_jumps(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<bool> {
     let off: Vec<f64> = place.iter().zip(stamp).map(|(place, stamp)| stamp - place).collect();
     let n = off.len();
     let mut cut = begins.to_vec();
     for i in 1..n {
         let jump = off[i] - off[i - 1];
-        // A backward jump is not a missing row.
+        // A backward jump does not indicate missing rows.
         if cut[i] || jump < MIN_JUMP_STEPS {
             continue;
         }
@@ -120,7 +120,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// A local line at one row: its value, and the weight of the row's stamp in it.
+/// Value of a local line at one row, and the weight of the row's own stamp in this value.
 struct LocalLine {
     value: f64,
     own: f64,
@@ -167,7 +167,7 @@ fn smoothed_runs(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> 
     smooth
 }
 
-/// RMS error of the prediction of a stamp from its neighbours. Source: the left-out residual of a linear smoother,
+/// RMS error with which the neighbours of a stamp predict it. Source: the left-out residual of a linear smoother,
 /// `e / (1 - h)`; Wahba, Spline Models for Observational Data (1990), 4.2.
 fn left_out_error(place: &[f64], stamp: &[f64], begins: &[bool], half: usize) -> f64 {
     let (mut square, mut count) = (0.0, 0.0_f64);

@@ -1,8 +1,8 @@
-//! Converts rows with time stamps to pieces of samples on a uniform clock.
+//! Conversion of rows with time stamps to pieces of samples on a uniform clock.
 //!
-//! [`Clock`] is the decision on the rate and on the times of the samples: stamps, smoothed stamps (`drift`) or even
-//! spacing. The `Timeline` assigns each row its place, the `Segmenter` cuts the rows at gaps, and its `Resampler`
-//! interpolates each piece on a separate grid.
+//! [`Clock`] decides on the sample rate and on the times of the samples: the stamps, smoothed stamps (`drift`) or even
+//! spacing. The `Timeline` assigns each row its place on the time axis, the `Segmenter` cuts the rows at gaps, and its
+//! `Resampler` interpolates each piece on a separate grid.
 
 mod drift;
 mod resampler;
@@ -17,8 +17,8 @@ use drift::{Drift, smoothed, windows};
 use crate::log::ClockRule;
 use serde::{Deserialize, Serialize};
 
-/// Minimum distance of two stamps, as a share of the mean step. The second of two closer stamps is mostly noise and is
-/// ignored in the interpolation.
+/// Minimum distance between two stamps, as a share of the mean step. If two stamps are closer, their difference is
+/// mostly noise, and the second sample is not used for interpolation.
 pub(crate) const MIN_STEP_RATIO: f64 = 0.1;
 
 /// Properties of the clock, estimated from the first rows.
@@ -31,22 +31,23 @@ pub struct Clock {
     pub uniform: bool,
     /// Median step, s.
     pub median_step_s: f64,
-    /// Whether a row with the same stamp as the previous row is a copy of it and is ignored. Otherwise equal stamps are
-    /// rounded, and their rows have the usual spacing.
+    /// Whether a row with the same stamp as the previous row is a copy of it and is ignored. If false, equal stamps
+    /// result from rounding, and their rows have the usual spacing.
     #[serde(default)]
     pub repeats_rows: bool,
-    /// RMS error of the cubic prediction of each position from its four neighbours, relative to the motion, for even
-    /// spacing; `None` if it was not needed.
+    /// RMS error with which the four neighbours of a position predict it by a cubic, for even spacing, relative to the
+    /// motion; `None` if it was not needed.
     pub misfit_uniform: Option<f64>,
-    /// The same for the stamps.
+    /// RMS error of the same prediction for samples at their stamps, relative to the motion; `None` if it was not
+    /// needed.
     pub misfit_stamps: Option<f64>,
-    /// Range of the deviation of the smoothed stamps from an even grid, steps; `None` if it was not needed.
+    /// Range of the deviations of the smoothed stamps from an even grid, steps; `None` if it was not needed.
     #[serde(default)]
     pub drift_steps: Option<f64>,
     /// Number of rows over which stamps are smoothed by local lines; 0 if they are not smoothed.
     #[serde(default)]
     pub smoothing_rows: usize,
-    /// The decision in one sentence.
+    /// The decision and its reason in one sentence.
     pub evidence: String,
 }
 
@@ -69,7 +70,8 @@ impl Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// With a jitter below [`negligible_jitter`](ClockSettings::negligible_jitter) spacing is even. Otherwise:
+/// If the jitter is below [`negligible_jitter`](ClockSettings::negligible_jitter), the spacing is even. Otherwise two
+/// questions are answered:
 ///
 /// 1. Does each stamp show when its sample was taken? Every sample is predicted from its four neighbours by the cubic
 ///    through them, at even spacing and at the stamps. If only the stamps jitter (a time taken after transmission),
@@ -78,11 +80,11 @@ impl Clock {
 ///    even grid by more than a step and the rate varies by more than 0.1 %, the smoothed stamps are used. The smoothing
 ///    window minimises the prediction error of left-out stamps, so that the drift is followed and jitter averaged out.
 ///
-/// Equal stamps: if such rows repeat the positions of the previous row and others do not, the rows are copies and take
-/// no time. Otherwise stamps are rounded to more than a step, and the mean step includes every row.
+/// Equal stamps: if rows with the stamp of the previous row repeat its positions and other rows do not, they are copies
+/// and take no time. Otherwise stamps are rounded to more than a step, and every row is included in the mean step.
 ///
-/// Steps are the unit throughout, so the result is independent of the unit of time. `Err` holds the reason why no rate
-/// can be determined.
+/// All times are measured in steps, so the result does not depend on the unit of time. `Err` contains the reason why no
+/// rate can be determined.
 pub(crate) fn clock(
     rule: ClockRule,
     time_s: &[f64],
@@ -137,11 +139,11 @@ pub(crate) fn clock(
 /// Steps between successive rows, without gaps.
 struct MeanStep {
     mean_s: f64,
-    /// Median of the positive steps, gaps included.
+    /// Median of the positive steps, including gaps.
     median_s: f64,
-    /// Standard deviation over the mean.
+    /// Standard deviation of the steps divided by their mean.
     jitter: f64,
-    /// Number of stamps equal to the previous one because of rounding.
+    /// Number of stamps that equal the previous one because of rounding.
     rounded: usize,
     /// Whether rows with the previous stamp are copies of the previous row.
     repeats_rows: bool,
@@ -210,7 +212,7 @@ fn describe_decision(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option
     }
 }
 
-/// Whether the rows `equal` have the positions of the previous row, while most of `all` rows do not.
+/// Whether the rows `equal` repeat the positions of their previous rows, while most of `all` rows do not.
 fn repeats_rows(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>, min_share: f64) -> bool {
     let is_same = |i: usize| q.iter().all(|q| q[i] == q[i - 1]);
     let share = |rows: &mut dyn Iterator<Item = usize>| {
@@ -221,9 +223,9 @@ fn repeats_rows(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize
     share(&mut equal.iter().copied()) > min_share && share(others) < 1.0 - min_share
 }
 
-/// Drift of the stamps from an even grid. The smoothing window minimises the error for left-out stamps. It is enlarged
-/// while positions are predicted clearly worse than at even spacing, because jitter over several rows (packets that
-/// arrive late together) is not a change of the rate.
+/// Drift of the stamps from an even grid. The smoothing window minimises the prediction error for left-out stamps. It
+/// is enlarged as long as positions are predicted clearly worse than with even spacing, because jitter over several
+/// rows (packets that arrive late together) is not a change of the rate.
 fn drift(
     time_s: &[f64],
     row: &[u64],
@@ -251,8 +253,8 @@ fn drift(
     found
 }
 
-/// RMS misfit of the cubic through two neighbours on either side, over all joints, in units of each joint's standard
-/// deviation: at even spacing and at the stamps.
+/// RMS error of predicting each position by the cubic through two neighbours on either side, over all joints, in units
+/// of each joint's standard deviation: for even spacing and for samples at the stamps.
 fn misfits(time_s: &[f64], q: &[Vec<f64>], mean: f64, max_gap: f64) -> (f64, f64) {
     let (mut uniform, mut stamps, mut count) = (0.0, 0.0, 0.0);
     let scales: Vec<f64> = q.iter().map(|q| deviation(q)).collect();

@@ -1,12 +1,13 @@
-//! Interpolates channels to a uniform grid: samples on the grid are copied, others interpolated by local cubics.
+//! Interpolation of channels to a uniform grid. Samples on the grid are copied; others are interpolated by local
+//! cubics.
 
 use super::{MIN_STEP_RATIO, lagrange};
 
-/// Streams one uninterrupted segment of channels onto the grid `first + k`, time in steps.
+/// Interpolates one uninterrupted segment of channels, sample by sample, to the grid `first + k` (time in steps).
 ///
-/// Between samples it evaluates the cubic through the two samples on either side (at the ends of the segment, through
-/// the four nearest): continuous, exact for cubics, error `(9/384) h⁴ |q''''|` at even spacing. A sample within 1e-6
-/// steps of a grid point is copied.
+/// Between samples, it evaluates the cubic through the two samples on either side; at the ends of the segment, the
+/// cubic through the four nearest samples. The result is continuous and exact for cubics, with the error
+/// `(9/384) h⁴ |q''''|` for even spacing h. A sample within 1e-6 steps of a grid point is copied.
 #[derive(Clone, Debug)]
 pub(crate) struct Resampler {
     /// Stamps of the samples that are still needed, in steps.
@@ -22,8 +23,8 @@ impl Resampler {
         Self { stamps: Vec::new(), channels: vec![Vec::new(); channels], next: 0.0, at: 0 }
     }
 
-    /// Adds the samples of `columns` from `index` on, at `stamps`, up to the first stamp that is too close to the
-    /// previous one (never for infinite stamps); returns the number of added samples.
+    /// Adds the samples of `columns` from `index` on, with the time stamps `stamps`. It stops at the first stamp that
+    /// is too close to the previous one (never for infinite stamps) and returns the number of added samples.
     pub(crate) fn push<'a>(
         &mut self,
         stamps: impl Iterator<Item = f64>,
@@ -46,10 +47,11 @@ impl Resampler {
         added
     }
 
-    /// Appends to `out` every grid point that later samples cannot change, or all that remain if the segment `ended`.
+    /// Appends to `out` the values at every grid point that later samples cannot change; if the segment `ended`, at all
+    /// remaining grid points.
     pub(crate) fn drain(&mut self, ended: bool, out: &mut [Vec<f64>]) {
         let n = self.stamps.len();
-        // The weights contain only differences of stamps, so their origin is arbitrary.
+        // The weights depend only on differences of stamps, so the origin of the stamps is arbitrary.
         let ahead = if ended { 1 } else { 3 };
         while self.at + ahead <= n && (ended || n >= 4) {
             while self.at + 1 < n && self.stamps[self.at + 1] <= self.next + 1e-6 {
@@ -86,7 +88,7 @@ impl Resampler {
         }
     }
 
-    /// Number of samples from the current one that lie on successive grid points, limited by `ahead`.
+    /// Number of samples, from the current one on, that are exactly on successive grid points, limited by `ahead`.
     fn run_on_grid(&self, ahead: usize) -> usize {
         let mut next = self.next;
         let is_on_grid = |stamp: &&f64| {

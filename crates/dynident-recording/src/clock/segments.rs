@@ -1,8 +1,8 @@
-//! Splits a log into uninterrupted pieces, each on a separate uniform grid.
+//! Division of a log into uninterrupted pieces, each on a separate uniform grid.
 
 use super::resampler::Resampler;
 
-/// Cuts a stream of rows at the start of each piece and resamples each piece.
+/// Divides a stream of rows at the start of each piece and interpolates each piece to its grid.
 #[derive(Clone, Debug)]
 pub(crate) struct Segmenter {
     resampler: Resampler,
@@ -14,9 +14,9 @@ pub(crate) struct Segmenter {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedRows<'a> {
-    /// Stamps, s.
+    /// Time stamps, s.
     pub(crate) time_s: &'a [f64],
-    /// Places, in steps.
+    /// Places of the rows on the time axis, in steps.
     pub(crate) steps: &'a [f64],
     /// Whether a row starts a new piece.
     pub(crate) begins: &'a [bool],
@@ -36,18 +36,18 @@ impl Segmenter {
         self.first.map_or(0.0, |(_, time_s)| time_s)
     }
 
-    /// Place of a row in the piece, in steps after its first sample.
+    /// Place of a row relative to the first sample of its piece, in steps.
     pub(crate) fn place_in_piece(&self, steps: f64) -> f64 {
         self.first.map_or(0.0, |(first, _)| steps - first)
     }
 
-    /// Number of samples left out because they are too close to the previous one.
+    /// Number of samples that were omitted because they are too close to the previous one.
     pub(crate) fn crowded(&self) -> u64 {
         self.crowded
     }
 
-    /// Takes rows from `at` on until the rows or the piece ends; returns the row where it stopped. `columns` returns
-    /// the channels.
+    /// Takes rows from `at` on until the rows or the piece end, and returns the row at which it stopped. `columns`
+    /// returns the channels.
     pub(crate) fn feed<'a, I: Iterator<Item = &'a Vec<f64>>>(
         &mut self,
         rows: PlacedRows<'_>,
@@ -65,7 +65,7 @@ impl Segmenter {
             let follow = rows.begins[index + 1..].iter().take_while(|begins| !**begins).count();
             let steps = &rows.steps[index..=index + follow];
             let added = self.resampler.push(steps.iter().map(|step| step - first), index, columns());
-            // The sample that ended the run is too close to the previous one.
+            // The sample at which `push` stopped is too close to the previous one.
             self.crowded += u64::from(added < steps.len());
             index += (added + 1).min(steps.len());
             self.last = true;

@@ -2,22 +2,24 @@
 
 use crate::error::{FilterError, require};
 
-/// Limits of the decision on the times of samples (see [`Clock`](super::Clock)). They are not part of a study file.
+/// Limits of the decision on the times of samples ([`Clock`](super::Clock)). They are not part of a study file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClockSettings {
-    /// Standard deviation of the time steps over their mean, below which the spacing is treated as even. At the default
-    /// of 0.1 % the position error of a wrong decision is a thousandth of the motion within one step.
+    /// Ratio of the standard deviation of the time steps to their mean below which the spacing is treated as even. At
+    /// the default of 0.1 %, a wrong decision causes a position error of a thousandth of the motion within one step.
     pub negligible_jitter: f64,
-    /// Minimum relative improvement of the position prediction for choosing one spacing over another, 0.1 by default.
+    /// Minimum relative improvement of the position prediction with which even spacing or the stamps are preferred to
+    /// the other, 0.1 by default.
     pub min_improvement: f64,
-    /// Minimum share of rows with equal stamps that also repeat the position, for rows to be treated as repeated, 0.9
-    /// by default.
+    /// Minimum share of rows with equal stamps that also repeat the position, with which such rows are treated as
+    /// copies, 0.9 by default.
     pub min_repeat_share: f64,
-    /// Smallest deviation of the smoothed stamps from an even grid, in steps, for which the stamps are used instead of
-    /// the grid, 1 by default; less is within one step.
+    /// Minimum deviation of the smoothed stamps from an even grid, in steps, with which the smoothed stamps are used
+    /// instead of the grid, 1 by default.
     pub min_drift_steps: f64,
-    /// Smallest relative variation of the rate (RMS), in addition to `min_drift_steps`, for which the smoothed stamps
-    /// are used, 1e-3 by default. With an even grid, velocities have this relative error and inertias twice of it.
+    /// Minimum relative variation of the rate (RMS) with which the smoothed stamps are used, in addition to
+    /// `min_drift_steps`; 1e-3 by default. With an even grid instead, velocities would have this relative error and
+    /// inertias twice this error.
     pub min_rate_variation: f64,
 }
 

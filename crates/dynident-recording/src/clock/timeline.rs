@@ -1,23 +1,23 @@
-//! Places rows on the time axis, in steps of the even grid, and finds where a piece of the log ends.
+//! Placement of rows on the time axis, in steps of the even grid, and detection of the ends of pieces.
 
 use super::drift::{CONTEXT_ROWS, smoothed};
 use super::{Clock, Spacing};
 use crate::log::RawBlock;
 
-/// Maximum gap that is kept in the places, steps (eleven days at 1 kHz). A longer one is a wrong stamp, and places
-/// after it would lose precision.
+/// Maximum gap that is kept on the time axis, steps (eleven days at 1 kHz). A longer gap results from a wrong stamp;
+/// places after it would lose precision.
 const MAX_GAP_STEPS: f64 = 1e9;
 
-/// Number of rows within which the stamps after a late packet are on time again.
+/// Number of rows within which the stamps after a late packet must be on time again.
 const MAX_LATE_ROWS: usize = 32;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Places {
-    /// Steps of the even grid since the log's first row.
+    /// Number of steps of the even grid since the first row of the log.
     pub(crate) steps: Vec<f64>,
     /// Whether a row starts a new piece: after a gap, or with an earlier stamp than the previous row.
     pub(crate) begins: Vec<bool>,
-    /// Rows after a hole that is longer than a gap and can be filled.
+    /// Rows after a hole that is longer than a gap but can be filled.
     pub(crate) holes: Vec<usize>,
 }
 
@@ -26,15 +26,16 @@ pub(crate) struct Timeline {
     clock: Clock,
     longest_step_s: f64,
     longest_step_rows: f64,
-    /// Maximum hole that is filled, steps.
+    /// Maximum length of a hole that is filled, steps.
     bridged_steps: f64,
-    /// Number, stamp in seconds and whether a piece starts, of the last rows.
+    /// For each of the last rows its number, its stamp (s) and whether it starts a piece.
     past: Vec<(u64, f64, bool)>,
     last: Option<(u64, f64, f64)>,
 }
 
 impl Timeline {
-    /// A step longer than `max_gap_steps` median steps is a gap, except holes of at most `bridged_steps` steps.
+    /// Treats a step that is longer than `max_gap_steps` median steps as a gap, except holes of at most `bridged_steps`
+    /// steps.
     pub(crate) fn new(clock: &Clock, max_gap_steps: f64, bridged_steps: f64) -> Self {
         Self {
             clock: clock.clone(),
@@ -63,7 +64,7 @@ impl Timeline {
                         places.holes.push(index);
                     }
                     let even = match (is_gap && hole < MAX_GAP_STEPS, self.clock.repeats_rows && time == 0.0) {
-                        // A copy of the previous row has the same place and is left out.
+                        // A copy of the previous row has the same place and is omitted.
                         (_, true) => 0.0,
                         (true, false) => hole.round().max(rows),
                         (false, false) => rows,
@@ -82,11 +83,11 @@ impl Timeline {
         places
     }
 
-    /// Whether a late stamp is caused by a late packet, not by a gap: later stamps are on time again within
+    /// Whether a late stamp is caused by a late packet and not by a gap: later stamps are on time again within
     /// `MAX_LATE_ROWS` rows.
     fn catches_up(&self, last_row: u64, last_s: f64, block: &RawBlock, index: usize, next: Option<&RawBlock>) -> bool {
         let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
-        // Repeated rows come at twice the rate and would compensate any gap.
+        // Repeated rows arrive at twice the rate and would compensate for any gap.
         if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > MAX_LATE_ROWS as f64 {
             return false;
         }

@@ -1,14 +1,14 @@
-//! Findings of the check of a commanded motion.
+//! Findings of the check of commanded motions.
 
 use crate::report::Level;
 
-/// Fault of the time stamps.
+/// Fault in the time stamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StampFault {
     /// All stamps are equal.
     Equal,
-    /// Stamps change once per second, although there are several samples in each second.
+    /// Stamps change only once per second, although there are several samples in each second.
     WholeSeconds,
 }
 
@@ -22,7 +22,7 @@ pub enum Side {
     Upper,
 }
 
-/// Channels that are in another unit than the study states.
+/// Channels that are in degrees although the study states radians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum UnitOf {
@@ -30,11 +30,11 @@ pub enum UnitOf {
     Commands,
     /// The measured positions.
     Positions,
-    /// Both: the positions exceed the limits of the robot description.
+    /// Commands and positions: the positions exceed the limits of the robot description.
     Both,
 }
 
-/// One thing that [`check_commands`](super::check_commands) found. Joints are numbers in the log's order.
+/// A finding of [`check_commands`](super::check_commands). Joints are indices in the order of the log.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CommandFinding {
@@ -45,12 +45,12 @@ pub enum CommandFinding {
     },
     /// The columns of commands and of measured positions are exchanged: the commands follow the positions.
     Exchanged {
-        /// Time by which the "commands" follow the "positions", s: median over the joints.
+        /// Time by which the columns of "commands" are later than those of "positions", s: median over the joints.
         lag_s: f64,
-        /// Number of joints that show it.
+        /// Number of joints that show this.
         joints: usize,
     },
-    /// Degrees where the study states radians.
+    /// Values are in degrees although the study states radians.
     Degrees {
         /// The channels in degrees.
         of: UnitOf,
@@ -59,11 +59,11 @@ pub enum CommandFinding {
         /// Ratio of position changes to command changes, median of these joints.
         ratio: f64,
     },
-    /// The position moves against the command.
+    /// The position moves in the opposite direction of the command.
     Sign {
         /// The joint.
         joint: usize,
-        /// Correlation, negative.
+        /// Correlation of command and position; negative.
         correlation: f64,
     },
     /// Command and position have different zeros.
@@ -84,36 +84,36 @@ pub enum CommandFinding {
         /// The joint whose command the position follows instead.
         follows: Option<usize>,
     },
-    /// The firmware limits the command, and the log contains the command before this limit.
+    /// The servo limits the command to its range, but the log contains the command before this limit.
     Clamped {
         /// The joint.
         joint: usize,
-        /// The limit.
+        /// Which end of the range.
         side: Side,
         /// Position at the limit, rad or m.
         limit: f64,
-        /// Most extreme command, rad or m.
+        /// Command that is farthest beyond the limit, rad or m.
         command: f64,
-        /// Total time, s.
+        /// Total time with commands beyond the limit, s.
         total_s: f64,
     },
-    /// Steps of the position that no motion causes.
+    /// The position jumps as no motion could.
     Jumps {
         /// The joint.
         joint: usize,
         /// Number of jumps.
         count: usize,
-        /// Time of the largest one, s after the first data row.
+        /// Time of the largest jump, s after the first data row.
         time_s: f64,
-        /// Size of the largest one, rad or m.
+        /// Size of the largest jump, rad or m.
         size: f64,
-        /// Whether the largest one is a whole turn, within 5 %.
+        /// Whether the largest jump is a whole turn, within 5 %.
         is_turn: bool,
     },
 }
 
 impl CommandFinding {
-    /// Severity: a problem makes an identification wrong, a warning may.
+    /// Severity: a problem makes an identification wrong, a warning may make it wrong.
     pub fn level(&self) -> Level {
         match self {
             Self::Stamps { .. }
@@ -149,7 +149,7 @@ impl CommandFinding {
         }
     }
 
-    /// Evidence with numbers, and what to do where no key corrects it.
+    /// Evidence with numbers, and advice if no key corrects the fault.
     pub fn evidence(&self, joints: &[String]) -> String {
         match self {
             Self::Stamps { fault: StampFault::Equal } => {

@@ -1,22 +1,22 @@
-//! Steps of a measured position that neither the motion nor the command explains.
+//! Detection of jumps of a measured position that neither the motion nor the command explains.
 
 use super::response::width;
 use super::settings::CommandCheckSettings;
 use super::{CommandFinding, JointMotion, median_step};
 use core::f64::consts::TAU;
 
-/// Number of steps before and after a step that show the speed of the motion.
+/// Number of sample steps before and after a jump that show the speed of the motion.
 const NEARBY_STEPS: usize = 10;
-/// Time before a step in which the command may have caused it, s.
+/// Time before a jump in which a change of the command may have caused it, s.
 const CAUSE_S: f64 = 1.0;
-/// Smallest change of the command that explains a step, as a share of the step.
+/// Minimum change of the command that explains a jump, as a share of the jump.
 const MIN_CAUSE_SHARE: f64 = 0.5;
-/// Largest sum of a step and the next one, as a share of the step, for a single wrong sample: motion does not return
-/// at once.
+/// Maximum sum of a jump and the next step, as a share of the jump, for a single wrong sample. (Motion does not return
+/// at once.)
 const MAX_RETURN_SHARE: f64 = 0.5;
-/// A time step of more median steps is a gap, over which the joint may have moved.
+/// A time step that is longer than this number of median steps is a gap, during which the joint may have moved.
 const MAX_GAP_STEPS: f64 = 3.0;
-/// Encoder count of a joint whose quantisation is unknown, rad or m.
+/// Assumed encoder count of a joint whose quantisation is unknown, rad or m.
 const DEFAULT_COUNT: f64 = TAU / 4096.0;
 /// Maximum difference of a jump from a whole turn, as a share of the turn.
 const TURN_TOLERANCE: f64 = 0.05;
@@ -40,10 +40,10 @@ pub(super) fn jumps(
         if size < least || times_s[at + 1] - times_s[at] > MAX_GAP_STEPS * step_s {
             return false;
         }
-        // Next to it is the second step of an isolated sample.
+        // The step back from a single wrong sample is next to the jump, so it must not be used as motion nearby.
         let nearby = at.saturating_sub(NEARBY_STEPS)..(at + NEARBY_STEPS + 1).min(steps.len());
         let others = nearby.filter(|other| other.abs_diff(at) > 1).map(|other| steps[other].abs());
-        // The way back from a single wrong sample is part of the same jump.
+        // The step back from a single wrong sample belongs to the same jump.
         if at > 0 && returns(at - 1) && steps[at - 1].abs() >= least {
             return false;
         }

@@ -1,4 +1,4 @@
-//! Checks a commanded motion for mistakes of the recording and of the study: exchanged columns, units, signs, zeros,
+//! Check of a commanded motion for mistakes in the recording and in the study: exchanged columns, units, signs, zeros,
 //! commands without effect, clamped commands, encoder jumps, invalid time stamps.
 
 mod clamped;
@@ -16,16 +16,17 @@ use crate::commanded::CommandedMotion;
 use response::{Response, median, range, width};
 
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// Range of the ratio of position to command, relative to that of a unit, for a motion in this unit: servos attenuate
-/// fast motion, down to 0.6 in the recordings.
+/// Smallest and largest ratio of position to command changes, relative to the factor of a unit, with which the motion
+/// is treated as being in this unit. (Servos attenuate fast motion, down to 0.6 in the test recordings.)
 const UNIT_RATIOS: [f64; 2] = [0.5, 1.3];
-/// Ratio of a position to the limits of the robot description above which it may be in degrees.
+/// Ratio of a position to the limits of the robot description above which the position may be in degrees.
 const MIN_LIMIT_RATIO: f64 = 4.0;
-/// Excess over the limits of the robot description that a correct position may have, rad or m, and as a factor.
+/// Margin beyond the limits of the robot description that a correct position may reach, in rad or m, and as a factor.
 const LIMIT_MARGINS: [f64; 2] = [0.2, 1.2];
-/// Share of the joints that must show exchanged columns.
+/// Minimum share of the joints that must show exchanged columns.
 const MIN_EXCHANGED_SHARE: f64 = 0.66;
-/// Smallest ratio of residual variances without and with the lag, for a lag that shows a direction.
+/// Minimum ratio of the residual variance without a lag to that with the lag, for the lag to show which channel follows
+/// the other.
 const MIN_LAG_GAIN: f64 = 1.2;
 
 /// Samples of one joint, and its response.
@@ -42,11 +43,11 @@ impl JointMotion {
     }
 }
 
-/// Findings about one log. `limits` are the lowest and highest position of each joint in the robot description, in the
-/// order of the log; empty if they are unknown.
+/// Checks one log with commands. `limits` are the lowest and highest position of each joint in the robot description,
+/// in the order of the log; empty if they are unknown.
 ///
-/// Each joint is described by the linear function of the earlier command that fits its position best,
-/// `q(t) ≈ a · r(t − lag) + b`. Lag, slope and correlation decide about exchanged columns, signs and units.
+/// For each joint, the position q is fitted by a linear function of an earlier command r, `q(t) ≈ a · r(t − lag) + b`.
+/// Lag, slope a and correlation decide about exchanged columns, signs and units.
 pub fn check_commands(
     motion: &CommandedMotion,
     limits: &[Option<[f64; 2]>],
@@ -65,13 +66,13 @@ pub fn check_commands(
         .collect();
     let mut found: Vec<CommandFinding> = stamps(&motion.times_s).into_iter().collect();
     if let Some(exchanged) = exchanged(&joints, step_s, settings) {
-        // Other comparisons of command and position have no meaning.
+        // If columns are exchanged, other comparisons of command and position have no meaning.
         found.push(exchanged);
         return found;
     }
     let jumps = |(joint, own)| jumps::jumps(joint, own, &motion.times_s, settings);
     found.extend(joints.iter().enumerate().filter_map(jumps));
-    // The position of a joint with a jump by a whole turn is compared once the jump is corrected.
+    // The position of a joint that jumps by a whole turn can only be compared after the jump is corrected.
     let is_turn = |finding: &CommandFinding| match finding {
         CommandFinding::Jumps { joint, is_turn: true, .. } => Some(*joint),
         _ => None,
@@ -135,7 +136,7 @@ fn exchanged(joints: &[JointMotion], step_s: f64, settings: &CommandCheckSetting
     Some(CommandFinding::Exchanged { lag_s: median(&mut negative)?, joints })
 }
 
-/// Findings about degrees, and the joints that they concern.
+/// Findings about degrees, and the joints with such values.
 fn degrees(
     joints: &[JointMotion],
     limits: &[Option<[f64; 2]>],
@@ -144,7 +145,7 @@ fn degrees(
     let ratio = |own: &JointMotion| own.response.slope.abs();
     let is_like = |own: &JointMotion, unit: f64| {
         let relative = ratio(own) / unit;
-        // A command in degrees has a large range, a command in radians next to degrees a normal one.
+        // A command in degrees has a large range; a correct command next to it has a normal range.
         width(&own.commands) >= settings.min_command_range
             && own.response.correlation.abs() >= settings.min_correlation
             && (UNIT_RATIOS[0]..=UNIT_RATIOS[1]).contains(&relative)

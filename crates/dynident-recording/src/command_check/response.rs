@@ -1,29 +1,32 @@
-//! Response of a joint to a command: lag, slope, offset, correlation.
+//! Response of a joint to its command: lag, slope, offset, correlation.
 
 /// Maximum number of samples for the search of the lag.
 const MAX_SAMPLES: usize = 20_000;
-/// Longest searched lag, samples.
+/// Longest lag that is searched, samples.
 const MAX_LAG_SAMPLES: usize = 500;
-/// Relative increase of the residual variance within which a shorter lag is preferred: periodic motions have several.
+/// Relative increase of the residual variance within which a shorter lag is preferred, because periodic motions have
+/// several equally good lags.
 const LAG_TOLERANCE: f64 = 0.05;
 
-/// Position as a linear function of the command some samples earlier: `q(i) = slope · r(i − lag) + ..`.
+/// Linear function that predicts the position q from the command r some samples earlier:
+/// `q(i) = slope · r(i − lag) + ..`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Response {
-    /// Samples by which the position follows the command; negative if it precedes the command.
+    /// Number of samples by which the position is later than the command; negative if it is earlier.
     pub(super) lag: isize,
     /// Change of the position per change of the command.
     pub(super) slope: f64,
-    /// Median of position minus lagged command.
+    /// Median of the position minus the lagged command.
     pub(super) offset: f64,
     /// Correlation of position and lagged command, 0 if one of them is constant.
     pub(super) correlation: f64,
-    /// Residual variance without a lag, relative to that with the lag.
+    /// Residual variance without a lag, divided by that with the lag.
     pub(super) lag_gain: f64,
 }
 
 impl Response {
-    /// The response with the largest correlation (by size) within `max_lag` samples in either direction.
+    /// Finds the response with the largest magnitude of the correlation, for lags up to `max_lag` samples in either
+    /// direction.
     pub(super) fn of(positions: &[f64], commands: &[f64], max_lag: usize) -> Self {
         let samples = positions.len().min(MAX_SAMPLES);
         let (positions, commands) = (&positions[..samples], &commands[..samples]);
@@ -53,14 +56,14 @@ impl Response {
     }
 }
 
-/// The positions at a distance of `margin` from both ends, and the commands `lag` samples earlier.
+/// The positions, except `margin` samples at both ends, and the commands `lag` samples earlier.
 fn lagged<'a>(positions: &'a [f64], commands: &'a [f64], lag: isize, margin: usize) -> (&'a [f64], &'a [f64]) {
     let (from, to) = (margin, positions.len() - margin);
     let shifted = from.saturating_add_signed(-lag);
     (&positions[from..to], &commands[shifted..shifted + (to - from)])
 }
 
-/// Slope of `q` on `r`, and their correlation; zeros if one of them is constant.
+/// Slope of the regression of `q` on `r`, and their correlation; zeros if one of them is constant.
 fn regression(q: &[f64], r: &[f64]) -> (f64, f64) {
     let count = q.len().max(1) as f64;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
@@ -72,7 +75,7 @@ fn regression(q: &[f64], r: &[f64]) -> (f64, f64) {
         rr += r * r;
         qr += q * r;
     }
-    // Constant up to rounding.
+    // Constant except for rounding errors.
     let is_constant = |sum: f64, mean: f64| sum <= 1e-20 * count * (1.0 + mean * mean);
     if is_constant(qq, mean_q) || is_constant(rr, mean_r) {
         return (0.0, 0.0);

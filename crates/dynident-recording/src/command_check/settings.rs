@@ -4,33 +4,34 @@ use crate::error::{FilterError, require};
 
 /// Thresholds of [`check_commands`](super::check_commands). They are not part of a study file.
 ///
-/// The evidence is 18 recordings of a real arm of six servos (SO-101, 50 Hz, gravity sag up to 0.09 rad, lag 0.06 to
-/// 0.5 s) and simulated first-order responses. One of the recordings has a fault, a clamped command; the defaults
-/// report it alone.
+/// The defaults were chosen with 18 recordings of a real arm with six servos (SO-101, 50 Hz, position errors by gravity
+/// up to 0.09 rad, lag 0.06 to 0.5 s) and with simulated first-order responses. One of the recordings has a fault, a
+/// clamped command; with the defaults, only this fault is reported.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommandCheckSettings {
     /// Longest lag between command and position that is searched, s. Default 0.5.
     pub max_lag_s: f64,
-    /// Smallest range of a command with which its effect is judged, rad or m. Default 0.05: smaller commands can
-    /// remain within the stiction of a servo, 0.03 rad in the recordings.
+    /// Smallest range of a command whose effect is judged, rad or m. Default 0.05: smaller commands may not overcome
+    /// the stiction of a servo (0.03 rad in the recordings).
     pub min_command_range: f64,
-    /// Correlation of command and position, above which both describe the same motion. Default 0.7; the recordings have
+    /// Correlation of command and position above which both describe the same motion. Default 0.7; the recordings have
     /// 0.78 to 1.
     pub min_correlation: f64,
-    /// Correlation below which a joint that moves does not follow its command. Default 0.5.
+    /// Correlation of command and position below which a moving joint does not follow its command. Default 0.5.
     pub max_unrelated_correlation: f64,
-    /// Range of the position, as a share of that of the command, below which a command has no effect. Default 0.1; the
-    /// recordings have 0.68 and more.
+    /// Range of the position, as a share of the range of the command, below which the command has no effect. Default
+    /// 0.1; the recordings have 0.68 and more.
     pub min_effect_share: f64,
-    /// Smallest constant difference of position and command that is reported as another zero, rad or m. Default 0.15:
-    /// the sag of a loaded servo is up to 0.09 rad.
+    /// Smallest constant difference of position and command that is reported as different zeros, rad or m. Default
+    /// 0.15: gravity causes errors of a loaded servo up to 0.09 rad.
     pub min_offset: f64,
-    /// Smallest part of a command beyond a limit of the position, rad or m. Default 0.15: dynamic motions of the
-    /// recordings have 0.11.
+    /// Smallest excess of a command over a limit of the position that is reported, rad or m. Default 0.15: dynamic
+    /// motions of the recordings reach 0.11.
     pub min_clamped_excess: f64,
-    /// Shortest total time of a clamped command, s. Default 0.3.
+    /// Shortest total time of a clamped command that is reported, s. Default 0.3.
     pub min_clamped_s: f64,
-    /// Smallest jump of a position, encoder counts. Default 8; a servo at rest flickers by one.
+    /// Smallest jump of a position that is reported, encoder counts. Default 8; the position of a servo at rest changes
+    /// by one count.
     pub min_jump_counts: f64,
     /// Smallest ratio of a jump to the other steps of the joint within 0.2 s. Default 5, as for logs with torque.
     pub jump_step_ratio: f64,

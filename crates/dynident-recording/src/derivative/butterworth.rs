@@ -4,7 +4,8 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 use crate::filter::sections::{Section, Triple, butterworth_low_pass, pole_radius, run};
 
-/// Share of the signal below which transients at the end of a window fall inside [`Differentiator::context_samples`].
+/// Share of the signal to which transients at the end of a window must decay within
+/// [`Differentiator::context_samples`].
 const MAX_TRANSIENT_SHARE: f64 = 1e-15;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +16,7 @@ struct Cascade {
 
 impl Cascade {
     fn new(order: usize, cutoff_hz: f64) -> Result<Self, FilterError> {
-        // Any rate above twice the cut-off validates order and cut-off.
+        // With a rate above twice the cut-off, only order and cut-off are checked.
         butterworth_low_pass(order, cutoff_hz, 4.0 * cutoff_hz)?;
         Ok(Self { order, cutoff_hz })
     }
@@ -24,22 +25,22 @@ impl Cascade {
         butterworth_low_pass(self.order, self.cutoff_hz, rate_hz)
     }
 
-    /// Length of the odd extension: three times the filter's length, as in `sosfiltfilt`. It exceeds the three samples
-    /// that the differences need.
+    /// Length of the odd extension at each end: three times the length of the filter, as in `sosfiltfilt`. It is longer
+    /// than the three samples that the differences need.
     fn padding(&self) -> usize {
         3 * (self.order + 1)
     }
 
     fn context_samples(&self, rate_hz: f64) -> usize {
         let Ok(sections) = self.sections(rate_hz) else { return 0 };
-        // The factor covers the amplification of transients by the cascade.
+        // The factor accounts for the amplification of transients by the cascade of sections.
         let decay = (MAX_TRANSIENT_SHARE.ln() / pole_radius(&sections).ln()).abs();
         (1.3 * decay).ceil() as usize + self.padding()
     }
 }
 
-/// Adds the first and second differences of a signal: d1[n] = x[n] - x[n-1], d2[n] = d1[n+1] - d1[n], constant before
-/// the start. A forward run starts in the steady state of a constant, whose differences are zero.
+/// Adds the first and second differences of a signal x: d1[n] = x[n] - x[n-1] and d2[n] = d1[n+1] - d1[n]. The signal
+/// is constant before its start, so a forward run starts in the steady state of a constant, with zero differences.
 fn add_differences(signal: &mut [Triple]) {
     let last = signal.len() - 1;
     for n in (1..=last).rev() {
@@ -50,8 +51,8 @@ fn add_differences(signal: &mut [Triple]) {
     }
 }
 
-/// Runs the cascade forwards from the steady state of the first value. The run of d2 is one sample ahead of d1: its
-/// history starts with d2[-1] = d1[0] - d1[-1] = 0.
+/// Runs the cascade of sections forwards from the steady state of the first value. The run of d2 is one sample ahead of
+/// that of d1: its history starts with d2[-1] = d1[0] - d1[-1] = 0.
 fn run_forwards(sections: &[Section], signal: &mut [Triple]) {
     let start = signal[0][0];
     run(sections, signal, [start, 0.0, 0.0], false);
@@ -62,45 +63,44 @@ fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
     run(sections, signal, [end, 0.0, 0.0], true);
 }
 
-/// A Butterworth low-pass run forwards and backwards, then differentiated.
+/// Differentiator: a Butterworth low-pass that runs forwards and backwards (zero phase), then central differences.
 ///
 /// Filtered position: `scipy.signal.sosfiltfilt(butter(order, cutoff_hz, fs=rate_hz, output="sos"), q)`, with its odd
-/// extension of default length at both ends. The amplitude is `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`,
-/// so one half at the cut-off.
+/// extension of default length at both ends. The gain at the frequency f is
+/// `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, which is one half at the cut-off f_c.
 ///
-/// Derivatives: central differences of sixth order of the filtered signal y (including its extension, so there is no
-/// one-sided formula at the ends), with δ²y = y₊ - 2y + y₋ and μδy = (y₊ - y₋)/2:
+/// Derivatives: central differences of sixth order of the filtered signal y, with δ²y = y₊ - 2y + y₋ and μδy = (y₊ -
+/// y₋)/2. They include the extension of the signal, so that no one-sided formula is needed at the ends:
 ///
 /// `dq = rate · (μδ - μδ³/6 + μδ⁵/30) y`,  `ddq = rate² · (δ² - δ⁴/12 + δ⁶/90) y`
 ///
-/// First and second differences of q pass through the same recursion as q. By linearity this equals differences of y,
-/// but the rounding error is relative to the acceleration, not to the position. A 5 kHz log needs this: two differences
-/// of y would cost eight digits.
-/// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44
-/// (1996) 988.
+/// The first and second differences of q are filtered by the same recursion as q. Because the filter is linear, the
+/// result equals differences of y, but its rounding error is relative to the acceleration and not to the position. This
+/// is necessary for logs at 5 kHz, for which two differences of y would lose eight digits. Source: Abramowitz and
+/// Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44 (1996) 988.
 pub type ButterworthZeroPhase = Butterworth<true>;
 
-/// A Butterworth low-pass run forwards only, then differentiated by central differences of sixth order.
+/// Differentiator: a Butterworth low-pass that runs forwards only (causal), then central differences of sixth order.
 ///
-/// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. The filter delays q, dq and
-/// ddq; the torque is delayed only if it passes [`smooth`](Differentiator::smooth) as well. A regressor that lags the
-/// torque by δ biases the fit by about ωδ at each frequency ω of the motion. Use this filter for comparison, and for
-/// logs whose torque was filtered in the same way.
+/// The gain at the frequency f is `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, which is 0.707 at the cut-off
+/// f_c. The filter delays q, dq and ddq; the torque is delayed only if it is also filtered by
+/// [`smooth`](Differentiator::smooth). If the regressor is later than the torque by δ, the fit has a relative error of
+/// about ωδ at each frequency ω of the motion. Use this filter for comparison, and for logs whose torque was filtered
+/// in the same way.
 ///
-/// The run starts in the steady state of a point-mirrored extension of three filter lengths, as in
-/// [`ButterworthZeroPhase`].
-/// Source: Atkeson, An, Hollerbach, Int. J. Robotics Res. 5 (1986) 101 (filtered by a low-pass before differentiation);
-/// Oppenheim and Schafer, Discrete-Time Signal Processing, 7.1.2.
+/// As in [`ButterworthZeroPhase`], the signal is extended at its start by a point-mirrored copy of three filter
+/// lengths, and the run begins in the steady state. Source: Atkeson, An, Hollerbach, Int. J. Robotics Res. 5 (1986) 101
+/// (filtered by a low-pass before differentiation); Oppenheim and Schafer, Discrete-Time Signal Processing, 7.1.2.
 pub type LowPass = Butterworth<false>;
 
-/// A [`ButterworthZeroPhase`], run `BOTH_WAYS`, or a [`LowPass`].
+/// Butterworth low-pass with differentiation: a [`ButterworthZeroPhase`] if `BOTH_WAYS`, otherwise a [`LowPass`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Butterworth<const BOTH_WAYS: bool> {
     cascade: Cascade,
 }
 
 impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
-    /// A filter of one-way order `order` and cut-off `cutoff_hz`.
+    /// Creates a filter with the cut-off `cutoff_hz`; `order` is the order of a single run.
     ///
     /// # Errors
     /// If `order` is not 1 to 12 or the cut-off is not positive.
@@ -108,12 +108,13 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
         Ok(Self { cascade: Cascade::new(order, cutoff_hz)? })
     }
 
-    /// Cut-off of a single run; the gain of two runs is one half there.
+    /// Cut-off of a single run, Hz. The gain of a forward and a backward run together is one half there.
     pub fn cutoff_hz(&self) -> f64 {
         self.cascade.cutoff_hz
     }
 
-    /// The filtered signal with extensions of the returned length at both ends, optionally with its differences.
+    /// The filtered signal, extended at both ends by the returned number of samples; with its differences if
+    /// `differences` is true.
     fn filtered(&self, rate_hz: f64, signal: &[f64], differences: bool) -> Result<(Vec<Triple>, usize), FilterError> {
         self.check_length(signal.len())?;
         let (sections, pad) = (self.cascade.sections(rate_hz)?, self.cascade.padding());
@@ -123,7 +124,7 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
         }
         run_forwards(&sections, &mut signal);
         if BOTH_WAYS {
-            // Beyond the end the first difference is zero, so the second difference at the end is minus the first one.
+            // The signal is constant beyond its end, so the second difference at the end is minus the first difference.
             let last = signal.len() - 1;
             signal[last][2] = -signal[last][1];
             run_backwards(&sections, &mut signal);
@@ -133,14 +134,14 @@ impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
 }
 
 impl LowPass {
-    /// Delay of a slow signal, s: the group delay at zero frequency. For an analogue Butterworth filter of order n it
-    /// is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
+    /// Delay of slow signals, s: the group delay at zero frequency. For an analogue Butterworth filter of order n with
+    /// the cut-off f_c it is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, for example 2.61/(2π f_c) for order 4.
     ///
     /// # Errors
     /// If the cut-off is not below half of `rate_hz`.
     pub fn delay_s(&self, rate_hz: f64) -> Result<f64, FilterError> {
         let sections = self.cascade.sections(rate_hz)?;
-        // For H = B/A of unit gain: Σ k b_k / Σ b_k - Σ k a_k / Σ a_k.
+        // Group delay at zero frequency for H = B/A with unit gain: Σ k b_k / Σ b_k - Σ k a_k / Σ a_k.
         let delay = |section: &Section| {
             let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
             (b1 + 2.0 * b2) / (b0 + b1 + b2) - (a1 + 2.0 * a2) / (1.0 + a1 + a2)
@@ -184,7 +185,7 @@ impl<const BOTH_WAYS: bool> Differentiator for Butterworth<BOTH_WAYS> {
 fn sixth_order(signal: &[Triple], n: usize, rate_hz: f64) -> [f64; 3] {
     let d2 = |k: isize| signal[n.wrapping_add_signed(k)][2];
     let first = 0.5 * (signal[n][1] + signal[n + 1][1]);
-    // μδ³, μδ⁵, δ⁴ and δ⁶ from second differences.
+    // μδ³, μδ⁵, δ⁴ and δ⁶ are computed from second differences.
     let third = 0.5 * (d2(1) - d2(-1));
     let fifth = 0.5 * (d2(2) - 2.0 * d2(1) + 2.0 * d2(-1) - d2(-2));
     let fourth = d2(1) - 2.0 * d2(0) + d2(-1);

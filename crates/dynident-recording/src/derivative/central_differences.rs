@@ -3,8 +3,8 @@
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 
-/// Finite differences on `order + 1` points, central inside and one-sided at the ends, exact for polynomials of degree
-/// `order`. The position is not filtered.
+/// Finite differences on `order + 1` points: central inside the log, one-sided at its ends, exact for polynomials of
+/// degree `order`. The position is not filtered.
 ///
 /// The weights come from Fornberg's recursion: Math. Comp. 51 (1988) 699. The first derivative of order 2 is
 /// `numpy.gradient(q, h, edge_order=2)`.
@@ -49,7 +49,8 @@ impl Differentiator for CentralDifferences {
             let from = i.saturating_sub(half).min(n - 1 - self.order);
             let [first, second] = &self.weights[i - from];
             let points = &q[from..=from + self.order];
-            // Differences to the sample itself make the rounding error relative to the motion, not to the position.
+            // Differences from the sample itself are used, so that rounding errors are relative to the motion and not
+            // to the position.
             let sum = |weights: &[f64]| weights.iter().zip(points).map(|(w, x)| w * (x - q[i])).sum::<f64>();
             out.q[i] = q[i];
             out.dq[i] = rate_hz * sum(first);
@@ -59,7 +60,7 @@ impl Differentiator for CentralDifferences {
     }
 }
 
-/// Weights of the first and second derivative at `at` from values at `points`.
+/// Weights of the first and second derivative at `at`, for values at `points`.
 fn fornberg(at: f64, points: &[f64]) -> [Vec<f64>; 2] {
     let n = points.len();
     let mut c = vec![[0.0; 3]; n];

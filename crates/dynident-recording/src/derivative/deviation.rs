@@ -1,4 +1,4 @@
-//! Smooths only the deviation of a joint from its reference.
+//! Differentiator that smooths only the deviation of a joint from its commanded motion (reference).
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, piece_lag};
@@ -6,15 +6,16 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `q = q_d + e`: another differentiator smooths and differentiates the deviation e, and the exact derivatives of the
-/// reference are added:
+/// The position is `q = q_d + e` with the reference q_d and the deviation e. Another differentiator S smooths and
+/// differentiates e, and the exact derivatives of the reference are added:
 ///
 /// `dq = dq_d + S{e}'`, `ddq = ddq_d + S{e}''`
 ///
-/// A linear smoother S attenuates `(1 - H) e` instead of `(1 - H) q`: its bias shrinks by the size of e relative to q,
-/// and its noise is unchanged. This gives less bias at equal noise, or a lower cut-off and less noise at equal bias.
-/// With `max_lag_s` the reference is first shifted by the lag of the whole piece, so that a delay does not contribute
-/// to e. Samples after the end of a reference that ends in motion are marked. Source: this project.
+/// A linear smoother with the frequency response H removes `(1 - H) e` instead of `(1 - H) q`. Its bias is therefore
+/// smaller by the ratio of e to q, and its noise is unchanged: there is less bias at equal noise, or, with a lower
+/// cut-off, less noise at equal bias. With `max_lag_s`, the reference is first shifted by the lag of the whole piece,
+/// so that a delay does not contribute to e. If the reference ends in motion, samples after its end are marked as
+/// invalid. This method was developed for Dynident.
 #[derive(Debug)]
 pub struct Deviation {
     reference: Arc<Reference>,
@@ -23,8 +24,8 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Creates a differentiator that smooths the deviation from `reference` by `smoother`, after a lag of at most
-    /// `max_lag_s` if given.
+    /// Creates a differentiator that smooths the deviation from `reference` by `smoother`. If `max_lag_s` is given, the
+    /// reference is first shifted by a lag of at most this time.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.
@@ -60,8 +61,8 @@ impl Differentiator for Deviation {
             None => 0.0,
         };
         let time_s = |i: usize| place.time_s(i) - lag_s;
-        // Where the reference is not known, repeat the deviation of the nearest known sample: a jump would disturb
-        // valid samples.
+        // Where the reference is not known, the deviation of the nearest known sample is repeated, because a jump would
+        // disturb valid samples.
         let known: Vec<bool> = (0..q.len()).map(|i| self.reference.covers(place.joint, time_s(i))).collect();
         let mut deviation = vec![0.0; q.len()];
         let mut last = (0..q.len()).find(|&i| known[i]).unwrap_or(0);

@@ -1,9 +1,10 @@
-//! Interface of differentiators from q to dq and ddq, also for differentiators of a caller.
+//! Interface of differentiators, which compute velocity dq and acceleration ddq from positions q. Callers can implement
+//! their own.
 
 use crate::error::FilterError;
 use core::ops::Range;
 
-/// Output slices of a differentiator, each of the input's length.
+/// Output slices of a differentiator; each has the length of the input.
 #[derive(Debug)]
 pub struct Derivatives<'a> {
     /// Filtered position.
@@ -26,7 +27,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The first joint from time zero on.
+    /// The first joint, starting at time zero.
     pub fn start(rate_hz: f64) -> Self {
         Self { rate_hz, joint: 0, first_time_s: 0.0 }
     }
@@ -49,11 +50,11 @@ pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
 
 /// Estimates filtered position, velocity and acceleration from uniformly sampled positions of one joint.
 ///
-/// A differentiator with finite [`context_samples`](Self::context_samples) processes a long log in pieces: with that
-/// number of extra samples on either side, a window gives the same result as the whole log. Methods that fit the whole
-/// piece, or estimate a lag over it, keep the default.
+/// A differentiator with finite [`context_samples`](Self::context_samples) processes a long log in windows: with this
+/// number of additional samples on either side, a window gives the same result as the whole log. Methods that fit the
+/// whole log, or estimate a lag over it, keep the default.
 ///
-/// A new differentiator needs a name, the minimum number of samples and
+/// To implement a differentiator, define its name, the minimum number of samples and
 /// [`differentiate_at`](Self::differentiate_at).
 /// [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) accepts any implementation.
 ///
@@ -101,7 +102,7 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
     /// Name as in the study file.
     fn name(&self) -> &'static str;
 
-    /// Minimum signal length, samples.
+    /// Minimum length of the signal, samples.
     fn minimum_samples(&self) -> usize;
 
     /// Number of samples at either end of a window that depend on samples outside the window (by more than 1e-12 of the
@@ -111,8 +112,8 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         None
     }
 
-    /// Fills `out` from the positions `q` at `place`. Joint and time are used only by differentiators that follow a
-    /// [`Reference`](crate::Reference).
+    /// Computes `out` from the positions `q`. Joint and time in `place` are used only by differentiators that need the
+    /// commanded motion, a [`Reference`](crate::Reference).
     ///
     /// Returns the samples where velocity and acceleration are not valid.
     ///
@@ -124,7 +125,8 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
     /// If a slice of `out` is shorter than `q`.
     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError>;
 
-    /// Applies the smoothing of q to another signal of the same clock (a torque); by default the signal is unchanged.
+    /// Applies the smoothing of the positions to another signal with the same clock (a torque). By default the signal
+    /// is unchanged.
     ///
     /// # Errors
     /// As [`differentiate_at`](Self::differentiate_at).
@@ -134,7 +136,7 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         Ok(())
     }
 
-    /// Calls [`differentiate_at`](Self::differentiate_at) for the first joint from time zero on.
+    /// Calls [`differentiate_at`](Self::differentiate_at) for the first joint, starting at time zero.
     ///
     /// # Errors
     /// As [`differentiate_at`](Self::differentiate_at).

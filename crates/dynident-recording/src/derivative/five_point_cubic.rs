@@ -1,4 +1,4 @@
-//! Five-point cubic smoothing of the torque, and low-pass filtered differences of the position.
+//! Differentiator with a five-point cubic smoothing of the torque and low-pass filtered differences of the position.
 
 use super::butterworth::ButterworthZeroPhase;
 use super::central_differences::CentralDifferences;
@@ -6,14 +6,15 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::savitzky_golay::SavitzkyGolay;
 use crate::error::{FilterError, require};
 
-/// Torque ([`smooth`](Differentiator::smooth)): the least-squares cubic on five points, `(-3, 12, 17, 12, -3)/35`,
-/// `passes` times; at the ends, the values of the first and last cubic. Position: one zero-phase Butterworth filter of
-/// order 4 for q, dq and ddq, the latter two by central differences of second order.
+/// Torque ([`smooth`](Differentiator::smooth)): smoothed `passes` times by the least-squares cubic on five points, with
+/// the weights `(-3, 12, 17, 12, -3)/35`; at the ends, the values of the first and last cubic. Position: a zero-phase
+/// Butterworth filter of order 4 for q, dq and ddq; dq and ddq are central differences of second order.
 ///
-/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at ω rad per sample: 1 - 3ω⁴/35 for slow signals. White noise
-/// is reduced to √(17/35) = 0.70 in the first pass.
-/// Source: Zhang et al., as cited in the paper behind this project, for the combination (the phase of its low-pass is
-/// not given); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the weights.
+/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at the frequency ω (rad per sample), which is 1 - 3ω⁴/35 for
+/// slow signals. The first pass reduces white noise to √(17/35) = 0.70 of its standard deviation. Source: Zhang et al.,
+/// as cited in *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, for the combination
+/// (they do not state the phase of the low-pass); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the
+/// weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FivePointCubic {
     cubic: SavitzkyGolay,
@@ -53,8 +54,8 @@ impl Differentiator for FivePointCubic {
     }
 
     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        // Filter first: by linearity this is equivalent inside, but at the ends the filter would start from a noisy
-        // difference.
+        // The filter is applied first. Because of linearity, this is equivalent inside the signal; at the ends, the
+        // filter would otherwise start from a noisy difference.
         let mut filtered = vec![0.0; q.len()];
         self.low_pass.smooth(place.rate_hz, q, &mut filtered)?;
         self.differences.differentiate_at(place, &filtered, out)

@@ -1,17 +1,18 @@
-//! Fits a Fourier series to the positions in the time domain.
+//! Differentiator that fits a Fourier series to the positions in the time domain.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// Least-squares fit of an offset, an optional straight line and harmonics 1 to K of `base_hz` to the whole piece.
-/// Position, velocity and acceleration are those of the series, so exact for a motion inside the series:
+/// Fits an offset, an optional straight line and the harmonics 1 to K of the base frequency f (`base_hz`) to the whole
+/// piece by least squares. Position, velocity and acceleration are those of the series, so they are exact for a motion
+/// that the series can represent:
 ///
 /// `q(t) = c + d t + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`
 ///
 /// Noise of standard deviation σ in N samples over whole periods causes a standard deviation of `σ √((2K + 1)/N)` in q,
-/// `σ √(2 Σ (2πkf)²/N)` in dq and `σ √(2 Σ (2πkf)⁴/N)` in ddq. The bias is the motion outside the series: tracking
-/// errors at other frequencies, and transients before the motion repeats. Source: Swevers, Ganseman, Tükel, de
+/// `σ √(2 Σ (2πkf)²/N)` in dq and `σ √(2 Σ (2πkf)⁴/N)` in ddq. Motion that the series cannot represent causes bias:
+/// tracking errors at other frequencies, and transients before the motion repeats. Source: Swevers, Ganseman, Tükel, de
 /// Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourierFit {
@@ -21,7 +22,7 @@ pub struct FourierFit {
 }
 
 impl FourierFit {
-    /// Creates a series of `harmonics` harmonics of `base_hz`, with a straight line if `trend`.
+    /// Creates a fit with `harmonics` harmonics of `base_hz`, and with a straight line if `trend` is true.
     ///
     /// # Errors
     /// If the base frequency is not positive or the harmonics are not 1 to 200.

@@ -1,4 +1,4 @@
-//! Differentiation in the frequency domain.
+//! Differentiator that works in the frequency domain.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
@@ -8,39 +8,40 @@ use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
-/// Length of the bridge from the end of a piece to its start, in periods of the cut-off.
+/// Length of the transition from the end of a piece to its start, in periods of the cut-off frequency.
 const BRIDGE_PERIODS: f64 = 8.0;
 
-/// End of the tapered band, in cut-offs.
+/// Frequency at which the gain reaches zero with tapered ends, as a ratio to the cut-off.
 const TAPER_END_RATIO: f64 = 2.0;
 
-/// Extension of a piece beyond its ends (the transform assumes a periodic signal).
+/// Extension of a piece beyond its ends, because the Fourier transform assumes a periodic signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Ends {
-    /// A smooth bridge from the end to the start, over eight periods of the cut-off, with continuous value, velocity
-    /// and acceleration for any motion. The gain falls as half a cosine from the cut-off to twice the cut-off, so that
-    /// ringing is limited to the ends; one period of the cut-off at either end is ignored.
+    /// A smooth transition (bridge) from the end to the start over eight periods of the cut-off, with continuous value,
+    /// velocity and acceleration for any motion. From the cut-off to twice the cut-off, the gain falls as half a
+    /// cosine, so that ringing is limited to the ends. One period of the cut-off at either end is not used.
     #[default]
     Tapered,
-    /// The piece, then the piece reversed: value and acceleration are continuous, and so is the velocity of a motion at
-    /// rest at both ends.
+    /// The piece, followed by the reversed piece. Value and acceleration are continuous; the velocity is continuous if
+    /// the motion is at rest at both ends.
     Mirrored,
-    /// The piece repeated: for whole periods of a steady periodic motion. Any other motion leaks into all frequencies.
+    /// The piece, repeated. Use it for whole periods of a steady periodic motion; any other motion causes errors at all
+    /// frequencies.
     Periodic,
 }
 
-/// Differentiates the discrete Fourier transform X of the whole piece, truncated at the cut-off:
+/// Differentiates the discrete Fourier transform X of the whole piece, truncated at the cut-off f_c:
 ///
 /// `q = F⁻¹{X}`, `dq = F⁻¹{jω X}`, `ddq = F⁻¹{-ω² X}`, |ω| <= 2π f_c.
 ///
 /// Exact for a periodic motion below the cut-off over whole periods ([`Ends::Periodic`]). White noise of standard
-/// deviation σ causes a standard deviation of `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and `(2π f_c)²
-/// σ √(2 f_c/(5 rate))` in ddq; with tapered ends 1.17, 1.65 and 2.41 times these values. A motion that is mirrored
-/// while it moves rings far into the piece; use tapered ends. Source: Swevers, Ganseman, Tükel, de Schutter, van
-/// Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered ends are from this project.
+/// deviation σ causes a standard deviation of `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and
+/// `(2π f_c)² σ √(2 f_c/(5 rate))` in ddq; with tapered ends 1.17, 1.65 and 2.41 times these values. If a motion is
+/// mirrored while it moves, ringing extends far into the piece; use tapered ends. Source: Swevers, Ganseman, Tükel, de
+/// Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered ends were developed for Dynident.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrequencyDomain {
     cutoff_hz: f64,
@@ -57,7 +58,8 @@ impl FrequencyDomain {
         Ok(Self { cutoff_hz, ends })
     }
 
-    /// Samples in one period of the cut-off: the length of the polynomial fit at tapered ends, and of the ignored ends.
+    /// Number of samples in one period of the cut-off: the length of the polynomial fit at tapered ends, and of the
+    /// ends that are not used.
     fn edge(&self, rate_hz: f64) -> usize {
         ((rate_hz / self.cutoff_hz).ceil() as usize).max(MIN_END_SAMPLES)
     }
@@ -71,14 +73,15 @@ impl FrequencyDomain {
         }
     }
 
-    /// Applies (jω)^order in the band, with the order from 0 to `out.len() - 1`.
+    /// Multiplies the transform by (jω)^order below the cut-off, for the orders from 0 to `out.len() - 1`, and
+    /// transforms back.
     fn transformed(&self, rate_hz: f64, signal: &[f64], out: &mut [&mut [f64]]) -> Result<(), FilterError> {
         let n = signal.len();
         self.check_length(n)?;
         if self.cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
             return Err(FilterError::AboveNyquist { cutoff_hz: self.cutoff_hz, rate_hz });
         }
-        // Relative to the first sample, so that the rounding error scales with the motion.
+        // Values are relative to the first sample, so that rounding errors scale with the motion.
         let origin = signal[0];
         let mut input: Vec<f64> = signal.iter().map(|x| x - origin).collect();
         match self.ends {

@@ -1,10 +1,11 @@
-//! A differentiator of the caller as part of the settings; it is shared and not serialised.
+//! A differentiator that the caller implements, as a part of the settings. It is shared and not serialised.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 use std::sync::Arc;
 
-/// Code of a caller's [`Differentiator`]; empty if settings were read from a file. Equal only to itself and its clones.
+/// A caller's [`Differentiator`]; empty if the settings were read from a file. It is equal only to itself and its
+/// clones.
 #[derive(Clone, Debug, Default)]
 pub struct DifferentiatorCode(Option<Arc<dyn Differentiator>>);
 

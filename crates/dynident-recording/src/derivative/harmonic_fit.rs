@@ -4,19 +4,20 @@ use crate::error::{FilterError, require};
 use core::f64::consts::TAU;
 
 const BLOCK_ROWS: usize = 512;
-/// Minimum ratio of the pivot to the norm of a column. Below it a column is linearly dependent: six digits of the fit
-/// would remain.
+/// Minimum ratio of a pivot to the norm of its column. Below it the column is treated as linearly dependent; only six
+/// digits of the fit would remain.
 const MIN_PIVOT_RATIO: f64 = 1e-10;
 
 /// `x(t) = c + d s + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`, k = 1 .. K, with the time s scaled to ±1 over the
 /// samples.
 ///
-/// The straight line models the aperiodic part: otherwise different end values leak into all harmonics.
+/// The straight line represents the aperiodic part of the motion. Without it, different values at the two ends would
+/// change all harmonics.
 #[derive(Clone, Debug)]
 pub(crate) struct HarmonicFit {
     base_hz: f64,
     rate_hz: f64,
-    /// Centre and half span of the samples, in samples.
+    /// Centre and half of the length of the sampled interval, in samples.
     middle: f64,
     half: f64,
     harmonics: usize,
@@ -44,7 +45,7 @@ impl HarmonicFit {
         let half = 0.5 * (signal.len() as f64 - 1.0).max(1.0);
         let mut fit = Self { base_hz, rate_hz, middle: half, half, harmonics, trend, coefficients: Vec::new() };
         let columns = fit.columns();
-        // Relative to the first sample, so that the rounding error scales with the motion.
+        // Values are relative to the first sample, so that rounding errors scale with the motion.
         let origin = signal.first().copied().unwrap_or(0.0);
         let mut triangle = Triangle::new(columns + 1);
         let mut row = vec![0.0; columns + 1];
@@ -79,7 +80,7 @@ impl HarmonicFit {
     }
 
     fn phase(&self, harmonic: usize, sample: usize) -> f64 {
-        // Remove whole turns before the multiplication by 2π, so that the argument stays small in a long log.
+        // Whole turns are removed before the multiplication by 2π, so that the argument stays small in a long log.
         TAU * (harmonic as f64 * self.base_hz * sample as f64 / self.rate_hz).fract()
     }
 
@@ -114,7 +115,7 @@ pub(crate) fn check_series(base_hz: f64, harmonics: usize) -> Result<(), FilterE
     require((1..=200).contains(&harmonics), "harmonics", harmonics as f64, "give 1 to 200")
 }
 
-/// Triangular factor of a tall matrix that is added row by row; the last column is the right-hand side.
+/// Triangular factor of a tall matrix whose rows are added one after another; the last column is the right-hand side.
 /// Source: Golub and Van Loan, Matrix Computations, 5.1 and 5.2.
 struct Triangle {
     width: usize,

@@ -1,7 +1,7 @@
-//! Differentiators from q to dq and ddq.
+//! Differentiators, which compute velocity dq and acceleration ddq from positions q.
 //!
-//! [`Differentiator`] is the interface, also for differentiators of a caller; [`DifferentiatorSettings`] is the
-//! registry of the differentiators in this crate:
+//! [`Differentiator`] is the interface, which callers can also implement; [`DifferentiatorSettings`] lists the
+//! differentiators in this crate:
 //!
 //! * filters and local fits, which process a long log in pieces: [`ButterworthZeroPhase`] (the default), [`LowPass`],
 //!   [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];

@@ -1,4 +1,5 @@
-//! Computes velocity and acceleration from the position on a known stroke (the map of the paper).
+//! Differentiator that computes velocity and acceleration from the position on a known stroke (a commanded motion from
+//! rest to rest).
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, lags, samples_of};
@@ -6,22 +7,23 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// Number of bisections: reduces the bracket of any stroke below the resolution of its time.
+/// Number of bisections; they reduce the interval for the time within any stroke below the resolution of the time.
 const BISECTIONS: usize = 60;
 
-/// On a monotone stroke the position determines velocity and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
-/// paper's logistic strokes in closed form, its Eqs. 15 and 16 ([`LogisticPath::rates`](crate::LogisticPath::rates));
-/// for any other reference by solving `q_d(s) = q` for s within the stroke.
+/// On a monotone stroke, the position q determines the velocity and the acceleration: `dq = g(q)`, `ddq = g'(q) g(q)`.
+/// For logistic strokes, there is a closed form (Eqs. 15 and 16 of *Iterative Identification of Robot Dynamic
+/// Parameters Based on Logistic Function*, [`LogisticPath::rates`](crate::LogisticPath::rates)). For any other
+/// reference q_d, `q_d(s) = q` is solved for the time s within the stroke.
 ///
-/// * The branch (there or back, which stroke) is chosen by the phase at the time `t - δ`, with the estimated lag δ of
-///   the joint (one for each stroke, by least squares), because a joint that lags is still on the previous branch.
-/// * Samples are marked outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not
-///   followed within the maximum lag.
+/// * The stroke and its direction (there or back) are selected for the time `t - δ` with the estimated lag δ of the
+///   joint (one lag for each stroke, by least squares), because a joint that lags is still on the previous stroke.
+/// * Samples are marked as invalid outside the range of the stroke, where the formulas have the wrong sign, and on
+///   strokes that reverse or that the joint does not follow within the maximum lag.
 /// * Where the reference rests, velocity and acceleration are those of the reference, at most 1e-3 of their peaks.
 ///
 /// Position noise σ causes at most ωσ in dq and ω²σ in ddq. A pure lag causes no error; any other tracking error e =
-/// q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. The position is not filtered.
-/// Source: the paper's Eqs. 15 and 16; branch by lag and rejection of samples are from this project.
+/// q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. The position is not filtered. The selection by lag and the rejection
+/// of samples were developed for Dynident.
 #[derive(Clone, Debug)]
 pub struct PositionMap {
     reference: Arc<Reference>,
@@ -29,7 +31,7 @@ pub struct PositionMap {
 }
 
 impl PositionMap {
-    /// Creates a map for joints that follow `reference` within `max_lag_s`.
+    /// Creates a differentiator for joints that follow `reference` with a lag of at most `max_lag_s`.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.

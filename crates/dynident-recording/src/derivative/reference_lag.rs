@@ -1,4 +1,4 @@
-//! Estimates the lag of a joint behind its reference, stroke by stroke.
+//! Estimation of the lag of a joint behind its commanded motion (reference), stroke by stroke.
 
 use super::differentiator::Place;
 use crate::error::{FilterError, require};
@@ -6,9 +6,9 @@ use crate::reference::Reference;
 use crate::reference::Stroke;
 
 const MAX_COARSE_SAMPLES: usize = 400;
-/// Number of lags on either side of zero in the coarse search.
+/// Number of lags on either side of zero that the coarse search tries.
 const COARSE_LAGS: i32 = 50;
-/// Maximum number of Gauss-Newton steps; each step at least halves the change.
+/// Maximum number of Gauss-Newton steps; each step is at most half of the previous one.
 const MAX_ITERATIONS: usize = 30;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,15 +16,16 @@ pub(super) struct StrokeLag {
     pub(super) stroke: Stroke,
     /// Lag of the joint behind its reference, s; 0 if no sample of the stroke is in the piece.
     pub(super) lag_s: f64,
-    /// Whether the best lag is at the limit of the search; then the joint does not follow this reference.
+    /// Whether the best lag is at the limit of the search. In this case the joint does not follow this reference.
     pub(super) at_limit: bool,
 }
 
 /// For every stroke of the joint's reference, the lag δ that minimises `Σ (q(t) - q_d(t - δ))²` over the stroke's
-/// samples, |δ| <= `max_lag_s`: a coarse search, then Gauss-Newton with `∂/∂δ q_d(t - δ) = -dq_d(t - δ)`. White
-/// position noise σ causes a standard deviation of `σ/√(Σ dq_d²)`.
+/// samples, |δ| <= `max_lag_s`, with the measured position q and the reference q_d. A coarse search is followed by
+/// Gauss-Newton steps with `∂/∂δ q_d(t - δ) = -dq_d(t - δ)`. White position noise σ causes a standard deviation of the
+/// lag of `σ/√(Σ dq_d²)`.
 ///
-/// Returns the lag of the whole piece, which assigns samples to strokes, and the lags of the strokes.
+/// Returns the lag of the whole piece (with which samples are assigned to strokes) and the lags of the strokes.
 ///
 /// # Errors
 /// [`FilterError::Setting`] if `max_lag_s` is not positive, finite and at most 60; [`FilterError::Reference`] if the
@@ -70,9 +71,9 @@ pub(super) fn check_joint(reference: &Reference, place: Place) -> Result<(), Fil
     Err(FilterError::Reference { problem })
 }
 
-/// Samples of a stroke for a joint with lag `lag_s`.
+/// Samples that belong to a stroke, for a joint with the lag `lag_s`.
 pub(super) fn samples_of(stroke: &Stroke, lag_s: f64, place: Place, samples: usize) -> core::ops::Range<usize> {
-    // Infinite times saturate.
+    // The conversion of infinite times to an index saturates.
     let index =
         |time_s: f64| (((time_s + lag_s - place.first_time_s) * place.rate_hz).ceil().max(0.0) as usize).min(samples);
     index(stroke.owns_from_s)..index(stroke.owns_to_s)
@@ -110,7 +111,8 @@ fn best(
             gradient += dq_d * (q_d - q[i]);
             curvature += dq_d * dq_d;
         }
-        // At most one coarse step, so that the iteration stays in the minimum that the search found.
+        // A step is at most one step of the coarse search, so that the iteration stays in the minimum that the search
+        // found.
         let longest = most / f64::from(COARSE_LAGS);
         let change = (gradient / curvature).clamp(-longest, longest);
         if !change.is_finite() {

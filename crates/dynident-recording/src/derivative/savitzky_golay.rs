@@ -1,12 +1,13 @@
-//! Savitzky-Golay filter: a polynomial fitted to a sliding window.
+//! Savitzky-Golay differentiator: a polynomial that is fitted to a sliding window.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 use crate::filter::orthonormal::orthonormal_polynomials;
 
-/// Value and derivatives at the centre of the least-squares polynomial of `degree` on `window` samples; in the first
-/// and last half window, of the polynomial of the first and last full window. Equals `scipy.signal.savgol_filter(q,
-/// window, degree, deriv=d, delta=1/rate, mode="interp")`. Source: Savitzky and Golay, Anal. Chem. 36 (1964) 1627.
+/// Computes value and derivatives at the centre of the least-squares polynomial of degree `degree` on `window` samples.
+/// In the first and last half window, the polynomial of the first and last full window is evaluated. Equals
+/// `scipy.signal.savgol_filter(q, window, degree, deriv=d, delta=1/rate, mode="interp")`. Source: Savitzky and Golay,
+/// Anal. Chem. 36 (1964) 1627.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavitzkyGolay {
     window: usize,
@@ -47,7 +48,8 @@ impl SavitzkyGolay {
         let from = i.saturating_sub(self.window / 2).min(signal.len() - self.window);
         let points = &signal[from..from + self.window];
         let weights = &self.weights[i - from][derivative];
-        // Relative to the sample itself, so that rounding scales with the motion. The weights of the value sum to one.
+        // Values are relative to the sample itself, so that rounding errors scale with the motion. The weights of the
+        // value sum to one.
         let sum: f64 = weights.iter().zip(points).map(|(w, x)| w * (x - signal[i])).sum();
         if derivative == 0 { sum + signal[i] } else { sum }
     }

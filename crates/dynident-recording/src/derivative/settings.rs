@@ -1,4 +1,4 @@
-//! Settings of the study key `differentiator`: the registry of all differentiators.
+//! Settings for the study key `differentiator`, with a variant for each differentiator.
 
 use super::butterworth::{ButterworthZeroPhase, LowPass};
 use super::central_differences::CentralDifferences;
@@ -83,7 +83,7 @@ pub enum DifferentiatorSettings {
         #[serde(default)]
         ends: Ends,
     },
-    /// [`SmoothedDifferences`]: central differences; acceleration and torque are smoothed by a moving average.
+    /// [`SmoothedDifferences`]: central differences; a moving average smooths acceleration and torque.
     SmoothedDifferences {
         /// Order of accuracy of the differences; 2 by default.
         #[serde(default = "two")]
@@ -93,7 +93,7 @@ pub enum DifferentiatorSettings {
     },
     /// [`FivePointCubic`]: five-point cubic smoothing of the torque, low-pass filtered differences of the position.
     FivePointCubic {
-        /// Passes over the torque; 1 by default.
+        /// Number of smoothing passes over the torque; 1 by default.
         #[serde(default = "one")]
         passes: usize,
         /// Cut-off of the low-pass filter, Hz; estimated from the data by default.
@@ -111,26 +111,26 @@ pub enum DifferentiatorSettings {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
-    /// [`PositionMap`]: the paper's map from position to velocity and acceleration on a known stroke.
+    /// [`PositionMap`]: velocity and acceleration from the position on a known stroke.
     #[serde(alias = "logistic-map")]
     PositionMap {
-        /// The commanded motion; the reference of a log takes precedence.
+        /// Commanded motion; if the log has a reference, that one is used instead.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Maximum lag of a joint behind the reference, s; 0.5 by default.
+        /// Maximum lag of a joint behind the commanded motion, s; 0.5 by default.
         #[serde(default = "half")]
         max_lag_s: f64,
     },
-    /// [`TimeWarp`]: the reference at a shifted time, with one lag per stroke.
+    /// [`TimeWarp`]: the commanded motion at a shifted time, with one lag per stroke.
     TimeWarp {
-        /// The commanded motion; the reference of a log takes precedence.
+        /// Commanded motion; if the log has a reference, that one is used instead.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Maximum lag of a joint behind the reference, s; 0.5 by default.
+        /// Maximum lag of a joint behind the commanded motion, s; 0.5 by default.
         #[serde(default = "half")]
         max_lag_s: f64,
     },
-    /// A caller's [`Differentiator`]; its code is not serialised.
+    /// A [`Differentiator`] that the caller implements; its code is not serialised.
     Function {
         /// Name in results.
         function: String,
@@ -138,15 +138,15 @@ pub enum DifferentiatorSettings {
         #[serde(skip)]
         code: DifferentiatorCode,
     },
-    /// [`Deviation`]: the derivatives of the reference plus those of the smoothed deviation from it.
+    /// [`Deviation`]: derivatives of the commanded motion plus derivatives of the smoothed deviation from it.
     Deviation {
-        /// The commanded motion; the reference of a log takes precedence.
+        /// Commanded motion; if the log has a reference, that one is used instead.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Any differentiator that needs no reference; zero-phase Butterworth by default.
+        /// Differentiator for the deviation: any that needs no commanded motion; zero-phase Butterworth by default.
         #[serde(default)]
         smoother: Box<DifferentiatorSettings>,
-        /// Maximum lag by which the reference is shifted, s; not shifted by default.
+        /// Maximum lag by which the commanded motion is shifted, s; by default it is not shifted.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         max_lag_s: Option<f64>,
     },
@@ -179,7 +179,7 @@ impl Default for DifferentiatorSettings {
 }
 
 impl DifferentiatorSettings {
-    /// Checks the settings without a log and without the table of the reference.
+    /// Checks the settings, without a log and without reading the table of the commanded motion.
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -240,7 +240,7 @@ impl DifferentiatorSettings {
         }
     }
 
-    /// The cut-off in the settings (for a deviation, that of its smoother), Hz; `None` if it is estimated from the
+    /// Cut-off in the settings, Hz (for [`Deviation`], the cut-off of its smoother). `None` if it is estimated from the
     /// data, or if the differentiator has no cut-off.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.clone().cutoff_place().copied().flatten()
@@ -251,7 +251,7 @@ impl DifferentiatorSettings {
         matches!(self.clone().cutoff_place(), Some(None))
     }
 
-    /// Sets the cut-off if the settings do not contain one.
+    /// Sets the cut-off if the settings leave it to the data.
     #[must_use]
     pub fn with_cutoff(mut self, chosen_cutoff_hz: f64) -> Self {
         if let Some(place) = self.cutoff_place() {
@@ -260,8 +260,9 @@ impl DifferentiatorSettings {
         self
     }
 
-    /// Creates the differentiator; `chosen_cutoff_hz` is used if the settings contain no cut-off. A commanded motion
-    /// must be in closed form: see [`build_following`](Self::build_following).
+    /// Creates the differentiator; `chosen_cutoff_hz` is used if the settings contain no cut-off. If the settings
+    /// contain a commanded motion, it must be in closed form; for a table, use
+    /// [`build_following`](Self::build_following).
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -269,7 +270,7 @@ impl DifferentiatorSettings {
         self.build_following(chosen_cutoff_hz, None)
     }
 
-    /// As [`build`](Self::build), with the commanded motion, which takes precedence over that of the settings.
+    /// As [`build`](Self::build), with a commanded motion that is used instead of that in the settings.
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a commanded

@@ -1,16 +1,17 @@
-//! Central differences with a smoothed acceleration.
+//! Differentiator with central differences and a smoothed acceleration.
 
 use super::central_differences::CentralDifferences;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 
-/// Central differences of the logged positions; the acceleration is smoothed by a moving average of `window` samples,
-/// and so is the torque with `smooth_torque`. Position and velocity are not smoothed.
+/// Central differences of the logged positions. A moving average of `window` samples smooths the acceleration, and also
+/// the torque if `smooth_torque` is set. Position and velocity are not smoothed.
 ///
-/// White position noise σ causes `σ rate/√2` in dq (order 2). In ddq the average of second differences telescopes to
-/// the difference of two slopes, so `2 σ rate²/W` for 2 <= W, compared with `√6 σ rate²` without the average. The
-/// average reduces the acceleration by `(W² - 1)/(24 rate²)` times its second derivative. Near the ends the window
-/// shrinks and stays centred. Source: Xu et al., as cited in the paper behind this project.
+/// White position noise σ causes a standard deviation of `σ rate/√2` in dq (order 2). The average of second differences
+/// over W samples is the difference of two slopes, so the standard deviation in ddq is `2 σ rate²/W` for 2 <= W,
+/// compared with `√6 σ rate²` without the average. The average reduces the acceleration by `(W² - 1)/(24 rate²)` times
+/// its second derivative. Near the ends, the window is shorter but remains centred. Source: Xu et al., as cited in
+/// *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothedDifferences {
     differences: CentralDifferences,
@@ -59,7 +60,7 @@ impl Differentiator for SmoothedDifferences {
     }
 }
 
-/// Mean of `window` samples about each sample; fewer, still centred, near the ends.
+/// Mean of `window` samples around each sample; near the ends of fewer samples, still centred.
 fn moving_average(signal: &[f64], window: usize, out: &mut [f64]) {
     let n = signal.len();
     for (i, out) in out.iter_mut().enumerate().take(n) {

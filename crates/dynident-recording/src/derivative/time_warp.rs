@@ -1,4 +1,4 @@
-//! Evaluates the reference at a shifted time, with one shift per stroke.
+//! Differentiator that evaluates the commanded motion (reference) at a shifted time, with one shift per stroke.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, lags, samples_of};
@@ -6,13 +6,14 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `dq(t) = dq_d(t - δ_s)`, `ddq(t) = ddq_d(t - δ_s)`, with one lag δ_s for each stroke s of the joint (by least
-/// squares). The position is not filtered.
+/// Takes the derivatives of the reference q_d at a shifted time: `dq(t) = dq_d(t - δ_s)`, `ddq(t) = ddq_d(t - δ_s)`,
+/// with one lag δ_s for each stroke s of the joint (by least squares). The position is not filtered.
 ///
-/// Exact for any lag that is constant over a stroke. White position noise σ causes `|ddq_d| σ/√(Σ dq_d²)` in dq and
-/// `|jerk_d| σ/√(Σ dq_d²)` in ddq: with a thousand samples, a thirtieth of the noise of
+/// The result is exact if the lag is constant over a stroke. White position noise σ causes `|ddq_d| σ/√(Σ dq_d²)` in dq
+/// and `|jerk_d| σ/√(Σ dq_d²)` in ddq. With a thousand samples, this is a thirtieth of the noise of
 /// [`PositionMap`](super::PositionMap). Any other deviation (overshoot, vibration, wrong amplitude) is ignored and
-/// causes bias. Samples of strokes that are not followed within the maximum lag are marked. Source: this project.
+/// causes bias. Samples of strokes that the joint does not follow within the maximum lag are marked as invalid. This
+/// method was developed for Dynident.
 #[derive(Clone, Debug)]
 pub struct TimeWarp {
     reference: Arc<Reference>,
@@ -20,7 +21,7 @@ pub struct TimeWarp {
 }
 
 impl TimeWarp {
-    /// Creates a differentiator for joints that follow `reference` within `max_lag_s`.
+    /// Creates a differentiator for joints that follow `reference` with a lag of at most `max_lag_s`.
     ///
     /// # Errors
     /// If `max_lag_s` is not positive and at most 60.

@@ -1,18 +1,18 @@
-//! Fits a Fourier series to the filtered velocity.
+//! Differentiator that fits a Fourier series to the filtered velocity.
 
 use super::butterworth::ButterworthZeroPhase;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// Filters q and dq by a zero-phase Butterworth filter of order 4 and fits a Fourier series (offset and harmonics 1 to
-/// K of `base_hz`) to this dq over the whole piece. dq and ddq are the value and derivative of the series; q is the
-/// filtered position.
+/// Filters q and dq with a zero-phase Butterworth filter of order 4. Then it fits a Fourier series (offset and
+/// harmonics 1 to K of `base_hz`) to the filtered dq over the whole piece. The result is the filtered q, the series for
+/// dq, and the derivative of the series for ddq.
 ///
-/// Exact for a periodic motion in the series and well below the cut-off. The fit passes `√((2K + 1)/N)` of white noise
-/// in N samples. The noise of a filtered difference is smaller at the low frequencies of the series, so the noise of
-/// ddq is about that of [`FourierFit`](super::FourierFit). Source: Feng et al., as cited in the paper behind this
-/// project.
+/// The result is exact for a periodic motion that the series can represent and that is well below the cut-off. For N
+/// samples, the fit passes `√((2K + 1)/N)` of white noise. The noise of a filtered difference is smaller at the low
+/// frequencies of the series, so the noise of ddq is about that of [`FourierFit`](super::FourierFit). Source: Feng et
+/// al., as cited in *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocitySeries {
     base_hz: f64,
@@ -21,7 +21,8 @@ pub struct VelocitySeries {
 }
 
 impl VelocitySeries {
-    /// Creates a series of `harmonics` harmonics of `base_hz` for velocities filtered at `cutoff_hz`.
+    /// Creates a fit with `harmonics` harmonics of `base_hz` for velocities that are filtered with the cut-off
+    /// `cutoff_hz`.
     ///
     /// # Errors
     /// If a frequency is not positive or the harmonics are not 1 to 200.

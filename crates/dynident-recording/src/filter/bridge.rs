@@ -1,14 +1,15 @@
-//! Extends a piece so that it repeats without a jump.
+//! Smooth transition (bridge) from the end of a piece to its start, so that the piece can be repeated without a jump.
 
 use super::orthonormal::{half, orthonormal_polynomials};
 
-/// Degree of the polynomials at the ends.
+/// Degree of the polynomials that are fitted at the ends.
 const DEGREE: usize = 4;
 
 /// Minimum number of samples for the polynomial fit at an end.
 pub(crate) const MIN_END_SAMPLES: usize = 2 * (DEGREE + 1);
 
-/// Value, first and second derivative per sample, at sample `place` of the polynomial fitted to `signal`.
+/// Value, first and second derivative (per sample) of the polynomial that was fitted to `signal`, at the sample
+/// `place`.
 fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
     let origin = signal[place];
     let mut state = [origin, 0.0, 0.0];
@@ -21,16 +22,16 @@ fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
     state
 }
 
-/// `steps - 1` samples from the signal's end back to its start in `steps` steps: the quintic polynomial through value,
-/// velocity and acceleration at both ends, estimated by polynomials of degree 4 through `window` samples. The repeated
-/// extended signal has no jump up to the second derivative.
+/// The `steps - 1` samples of a transition in `steps` steps from the end of the signal back to its start. It is the
+/// quintic polynomial with the value, velocity and acceleration of both ends, which are estimated by polynomials of
+/// degree 4 through `window` samples. The repeated extended signal is continuous up to the second derivative.
 pub(crate) fn bridge(signal: &[f64], window: usize, steps: usize) -> Vec<f64> {
     let basis = orthonormal_polynomials(window, DEGREE);
     let [from, v0, a0] = state(&signal[signal.len() - window..], &basis, window - 1);
     let [to, v1, a1] = state(&signal[..window], &basis, 0);
     let length = steps as f64;
     let (c1, c2) = (v0 * length, 0.5 * a0 * length * length);
-    // Remaining value, slope and curvature at the far end.
+    // Value, slope and curvature that remain to be reached at the far end.
     let (rise, slope, curvature) = (to - from - c1 - c2, v1 * length - c1 - 2.0 * c2, a1 * length * length - 2.0 * c2);
     let c3 = 10.0 * rise - 4.0 * slope + 0.5 * curvature;
     let c4 = -15.0 * rise + 7.0 * slope - curvature;

@@ -1,25 +1,26 @@
-//! Estimates the cut-off: the frequency above which position noise exceeds the motion's acceleration.
+//! Estimation of the cut-off frequency: the frequency above which position noise exceeds the motion in the
+//! acceleration.
 
 use crate::error::{FilterError, require};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 
-/// Share of the velocity's power that defines its band.
+/// Share of the power of the velocity that its frequency band contains.
 const VELOCITY_SHARE: f64 = 0.99;
 pub(crate) const MAX_CUTOFF_SAMPLES: usize = 1 << 16;
 
-/// Limits of the choice of a cut-off. They are not part of a study file.
+/// Limits for the selection of a cut-off. They are not part of a study file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutoffSettings {
-    /// Share of the acceleration's power (noise subtracted) that defines the maximum frequency of the motion: this
-    /// share lies below it. 0.9999 by default.
+    /// Share of the acceleration's power (noise subtracted) that is below the maximum frequency of the motion; it
+    /// defines this frequency. 0.9999 by default.
     pub power_share: f64,
-    /// Ratio of the cut-off to the maximum frequency of the motion, 2 by default. Two-way Butterworth filters of order
-    /// 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. Attenuation of positions but not of
-    /// torque biases the fit; the default limits it to 0.4 %.
+    /// Ratio of the cut-off to the maximum frequency of the motion, 2 by default. Zero-phase Butterworth filters of
+    /// order 4 pass 99.6 % of the amplitude at half their cut-off, and 86 % at 0.8 of it. If positions are attenuated
+    /// but torque is not, the fit is biased; the default limits the attenuation to 0.4 %.
     pub margin: f64,
-    /// Smallest ratio of the spectrum to the noise floor for a joint that moves, 10 by default; other joints are
-    /// ignored.
+    /// Minimum ratio of the position spectrum to the noise floor with which a joint is treated as moving, 10 by
+    /// default; other joints are ignored.
     pub min_noise_ratio: f64,
     /// Maximum ratio of the cut-off to the sampling rate, 0.4 by default.
     pub max_rate_share: f64,
@@ -47,7 +48,7 @@ impl CutoffSettings {
     }
 }
 
-/// A cut-off with its evidence.
+/// A selected cut-off with its reasons.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffChoice {
@@ -55,28 +56,28 @@ pub struct CutoffChoice {
     pub cutoff_hz: f64,
     /// Cut-off that each joint needs, Hz; `None` for a joint that does not move.
     pub joints_hz: Vec<Option<f64>>,
-    /// Frequency at which each joint's motion falls below its position noise, Hz; `None` for a joint that does not
-    /// move.
+    /// Frequency above which the motion of each joint is smaller than its position noise, Hz; `None` for a joint that
+    /// does not move.
     #[serde(default)]
     pub faded_hz: Vec<Option<f64>>,
     /// Frequency below which each joint has 99 % of its velocity's power (noise subtracted), Hz; `None` for a joint
     /// that does not move. It is not stored in files.
     #[serde(skip)]
     pub velocity_hz: Vec<Option<f64>>,
-    /// The choice in one sentence.
+    /// The selection and its reason in one sentence.
     pub evidence: String,
 }
 
-/// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
+/// Selects one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q, which is the acceleration up to a factor (Hann
-/// window, three segments with half overlap):
-/// * Position noise makes the spectrum of the acceleration rise with frequency. The valley is the first frequency above
-///   the peak of the velocity's spectrum at which the acceleration's spectrum (smoothed over a quarter octave) falls
-///   below twice its minimum above this peak. There the motion disappears in the noise.
-/// * Data that were filtered before have their valley far above the motion. The joint therefore needs twice the
-///   frequency below which 99.99 % of the acceleration's power up to the valley lies.
+/// For each joint, the Welch spectrum of the second difference of q is used, which is the acceleration except for a
+/// factor (Hann window, three segments with half overlap):
+/// * Position noise makes the spectrum of the acceleration rise with frequency. The valley is the frequency at which
+///   the motion disappears in the noise: the first frequency above the peak of the velocity's spectrum at which the
+///   acceleration's spectrum (smoothed over a quarter octave) falls below twice its minimum above this peak.
+/// * If the recorder has filtered the positions, the valley is far above the motion. Therefore the cut-off for the
+///   joint is twice the frequency below which 99.99 % of the acceleration's power up to the valley is contained.
 ///
 /// The cut-off of the log is the maximum over the joints, at most 0.4 of the sample rate. A joint is ignored if its
 /// spectrum never exceeds ten times the median over the upper half of the frequencies. If all joints are ignored, the
@@ -85,7 +86,7 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     cutoff_within(q, rate_hz, &CutoffSettings::default())
 }
 
-/// [`cutoff`] with other limits than the defaults.
+/// As [`cutoff`], with other limits than the defaults.
 pub fn cutoff_within<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, limits: &CutoffSettings) -> CutoffChoice {
     let CutoffSettings { margin, max_rate_share, .. } = *limits;
     let spectra: Vec<Option<Spectrum>> = q.iter().map(|q| spectrum(q.as_ref())).collect();
@@ -132,13 +133,13 @@ struct Content {
 }
 
 struct Spectrum {
-    /// Spectrum of the second difference, from the second bin on.
+    /// Spectrum of the second difference of the positions, from the second bin on.
     acceleration: Vec<f64>,
-    /// Spectrum of the position, from the second bin on.
+    /// Spectrum of the positions, from the second bin on.
     position: Vec<f64>,
     /// Variance of the position noise of one sample.
     floor: f64,
-    /// Samples per piece.
+    /// Number of samples in a segment of the Welch spectrum.
     length: usize,
 }
 
@@ -182,7 +183,7 @@ fn content(spectrum: &Spectrum, rate_hz: f64, limits: &CutoffSettings) -> Option
     })
 }
 
-/// First bin below which this share of the power lies.
+/// First bin below which this share of the power is contained.
 fn bin_below(power: &[f64], share: f64) -> usize {
     let total: f64 = power.iter().sum();
     let mut sum = 0.0;

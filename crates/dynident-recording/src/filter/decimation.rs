@@ -1,4 +1,4 @@
-//! The parallel filter: one linear-phase low-pass for torque and all regressor columns, then decimation.
+//! The parallel filter: a linear-phase low-pass for torque and all regressor columns, followed by decimation.
 
 use crate::error::{FilterError, require};
 use core::f64::consts::PI;
@@ -13,16 +13,16 @@ use std::sync::Arc;
 pub struct DecimationSettings {
     /// Decimation factor, 1 to 1000; 10 by default.
     pub factor: usize,
-    /// Centre of the transition band (gain one half), Hz; by default 0.4 of the rate after decimation.
+    /// Centre of the transition band (gain one half), Hz; by default 0.4 of the sample rate after decimation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cutoff_hz: Option<f64>,
-    /// Width of the transition band, Hz; by default 0.4 of the rate after decimation, so that the stop band starts at
-    /// 0.6 of this rate.
+    /// Width of the transition band, Hz; by default 0.4 of the sample rate after decimation, so that the stop band
+    /// starts at 0.6 of this rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition_hz: Option<f64>,
-    /// Attenuation in the stop band, 21 to 120 dB. The gain in the pass band (up to 0.2 of the reduced rate) is within
-    /// `4 · 10^(-A/20)` of one, 0.4 % at the default of 60: the ripple of the two band edges is added, and normalising
-    /// the gain at zero frequency can double it.
+    /// Attenuation A in the stop band, 21 to 120 dB. The gain in the pass band (up to 0.2 of the reduced rate) differs
+    /// from one by at most `4 · 10^(-A/20)`, which is 0.4 % at the default of 60. (The ripples of the two band edges
+    /// add, and normalising the gain at zero frequency can double them.)
     pub stop_band_db: f64,
 }
 
@@ -32,12 +32,12 @@ impl Default for DecimationSettings {
     }
 }
 
-/// Maximum filter length, coefficients. A longer filter has a narrower transition band than logs require.
+/// Maximum filter length, coefficients. Longer filters would have a narrower transition band than logs require.
 const MAX_TAPS: usize = 20_001;
 
 impl DecimationSettings {
-    /// Filter coefficients at `rate_hz`: windowed sinc with Kaiser's window, odd length, symmetric, unit gain at zero
-    /// frequency.
+    /// Filter coefficients at `rate_hz`: a sinc function with Kaiser's window, of odd length, symmetric, with unit gain
+    /// at zero frequency.
     ///
     /// `h[k] = 2 f_c/rate · sinc(2 f_c/rate · (k - M)) · I₀(β √(1 - ((k - M)/M)²)) / I₀(β)`, length `(A - 7.95) /
     /// (2.285 Δω) + 1` with A two decibels above `stop_band_db`.
@@ -61,7 +61,7 @@ impl DecimationSettings {
         }
         let transition = self.transition_hz.unwrap_or(0.4 * reduced).min(2.0 * cutoff).min(rate_hz - 2.0 * cutoff);
         require(transition.is_finite() && transition > 0.0, "transition_hz", transition, "give a positive width")?;
-        // Kaiser's formulas are accurate to about 1 dB; 2 dB margin guarantee the documented attenuation.
+        // Kaiser's formulas are accurate to about 1 dB; a margin of 2 dB guarantees the documented attenuation.
         let attenuation = self.stop_band_db + 2.0;
         let beta = if attenuation > 50.0 {
             0.1102 * (attenuation - 8.7)
@@ -101,11 +101,11 @@ fn bessel_i0(x: f64) -> f64 {
     sum
 }
 
-/// Filters and decimates panels of columns with one filter, in a stream.
+/// Filters and decimates a stream of panels of columns, all with the same filter.
 ///
-/// Produces only rows whose filter support is inside the signal ("valid" convolution): output row `k` belongs to input
-/// row `k · factor + half_length` and has no delay. The result is independent of the partition of the input into
-/// panels.
+/// Only rows for which all samples of the filter are inside the signal are returned ("valid" convolution). Output row
+/// `k` belongs to input row `k · factor + half_length` and has no delay. The result does not depend on how the input is
+/// divided into panels.
 ///
 /// ```
 /// use dynident_recording::{DecimationSettings, Decimator};
@@ -123,21 +123,22 @@ pub struct Decimator {
     filter: Arc<Filter>,
     columns: usize,
     level: Level,
-    /// Partial sums of the outputs with incomplete support, by output and column; output `k` has index `k` modulo their
-    /// number.
+    /// Partial sums of the outputs that are not complete yet, by output and column; output `k` has the index `k` modulo
+    /// their number.
     begun: Vec<Block>,
-    /// Rows of the current columns.
+    /// Rows of the columns that are being processed.
     signal: Vec<Block>,
-    /// Number of rows and outputs of this signal so far.
+    /// Number of rows and of outputs of this signal so far.
     rows: usize,
     outputs: usize,
 }
 
-/// Number of partial sums per output: row `i` of the signal is added to sum `i` modulo this. The order of summation is
-/// thus independent of the lane count and of the partition of the input.
+/// Number of partial sums per output: row `i` of the signal is added to sum `i` modulo this number. The order of
+/// summation therefore depends neither on the number of processor lanes nor on how the input is divided.
 const BLOCK: usize = 8;
 
-/// Rows that are processed together: with eight columns they and the coefficients fit into the first-level cache.
+/// Number of rows that are processed together. With eight columns, they and the coefficients fit into the first-level
+/// cache.
 const PIECE_ROWS: usize = 512;
 
 /// One cache line of numbers.
@@ -151,8 +152,8 @@ impl Block {
 
 #[derive(Debug)]
 struct Filter {
-    /// The coefficients, shifted by 0, 1, .. and padded with zeros: for outputs whose support starts at this row of a
-    /// block.
+    /// The coefficients, shifted by 0, 1, .. and padded with zeros, for outputs whose first row has this position
+    /// within a block.
     phases: [Vec<Block>; BLOCK],
     length: usize,
     factor: usize,
@@ -177,7 +178,7 @@ impl Decimator {
         Ok(Self::of_filter(filter, columns))
     }
 
-    /// The same filter for panels of another number of columns, at the start of a signal.
+    /// The same filter for panels with another number of columns, at the start of a signal.
     #[must_use]
     pub fn with_columns(&self, columns: usize) -> Self {
         Self::of_filter(Arc::clone(&self.filter), columns)
@@ -188,7 +189,7 @@ impl Decimator {
         Self { filter, columns, level: Level::detect(), begun, signal: Vec::new(), rows: 0, outputs: 0 }
     }
 
-    /// Half length of the filter in rows: the first output belongs to this input row.
+    /// Half-length of the filter in rows: the first output belongs to this input row.
     pub fn half_length(&self) -> usize {
         self.filter.length / 2
     }
@@ -204,7 +205,8 @@ impl Decimator {
     }
 
     /// Adds the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents
-    /// of `out` by the output rows that are now complete, column-major with the returned row count as stride.
+    /// of `out` by the output rows that are now complete. They are column-major; the returned number of rows is the
+    /// stride.
     ///
     /// # Panics
     /// If the length of `panel` is not `rows` times the number of columns.
@@ -238,31 +240,32 @@ impl Decimator {
         produced
     }
 
-    /// Ends the signal, so that the next [`push`](Self::push) starts a new one. Returns the number of output rows since
-    /// the start.
+    /// Ends the signal; the next [`push`](Self::push) starts a new one. Returns the number of output rows since the
+    /// start of the signal.
     pub fn finish(&mut self) -> u64 {
         self.rows = 0;
         core::mem::take(&mut self.outputs) as u64
     }
 }
 
-/// Destination of complete outputs, column by column, from number `before` on.
+/// Destination of complete outputs, column by column, from output `before` on.
 struct Complete<'a> {
     values: &'a mut [f64],
     stride: usize,
     before: usize,
 }
 
-/// Adds rows to all outputs whose support contains them. Rows are read once, while they are in the cache.
+/// Adds rows to all outputs that contain them. Each row is read only once, while it is in the cache.
 struct Convolution<'a> {
     filter: &'a Filter,
     columns: usize,
     panel: &'a [f64],
-    /// Number of rows of the panel, the current range of them, and the signal's row number of the first.
+    /// Number of rows of the panel, their range that is being processed, and the number of the first of them in the
+    /// signal.
     stride: usize,
     piece: core::ops::Range<usize>,
     first_row: usize,
-    /// Number of outputs that were complete before.
+    /// Number of outputs that were complete before this panel.
     outputs: usize,
     begun: &'a mut [Block],
     signal: &'a mut Vec<Block>,
@@ -276,7 +279,8 @@ impl Kernel for Convolution<'_> {
     fn run<T: Lane>(mut self) {
         let mut column = 0;
         while column < self.columns {
-            // Each load of coefficients is used for all columns of a group, and their sums hide the latency.
+            // Coefficients that were loaded once are used for all columns of a group, and the sums of several columns
+            // hide the latency.
             column += match self.columns - column {
                 8.. => self.group::<T, 8>(column),
                 4.. => self.group::<T, 4>(column),
@@ -288,13 +292,13 @@ impl Kernel for Convolution<'_> {
 }
 
 impl Convolution<'_> {
-    /// Processes columns `column .. column + N`; returns their number.
+    /// Processes the columns `column .. column + N`, and returns their number.
     #[inline(always)]
     fn group<T: Lane, const N: usize>(&mut self, column: usize) -> usize {
         let Filter { length, factor, .. } = *self.filter;
         let (begin, end) = (self.first_row, self.first_row + self.piece.len());
         let first_block = begin / BLOCK;
-        // Rows of the first and the last block outside this piece are zero.
+        // In the first and the last block, rows outside of this range are zero.
         let blocks = end.div_ceil(BLOCK) - first_block;
         self.signal.resize(blocks * N, Block::ZERO);
         for n in 0..N {

@@ -1,10 +1,9 @@
-//! Filters that are independent of joints, and their components.
+//! Filters that do not depend on joints, and their components.
 //!
 //! [`Decimator`] is the parallel filter: the same linear-phase low-pass and decimation for all columns of the regressor
-//! and for the torque. [`cutoff()`] chooses a cut-off from the spectrum of the positions, [`position_noise()`]
-//! estimates the remaining noise below it. Internal: second-order
-//! sections of the Butterworth low-pass, orthonormal polynomials, and the bridge over the ends of a piece for a Fourier
-//! transform.
+//! and for the torque. [`cutoff()`] selects a cut-off from the spectrum of the positions, and [`position_noise()`]
+//! estimates the noise that remains below it. Internal modules: second-order sections of the Butterworth low-pass,
+//! orthonormal polynomials, and the smooth transition between the ends of a piece for a Fourier transform.
 
 pub(crate) mod bridge;
 pub(crate) mod cutoff;

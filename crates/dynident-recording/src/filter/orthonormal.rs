@@ -1,8 +1,8 @@
 //! Polynomials that are orthonormal over equally spaced samples.
 
-/// For each degree from 0 on, the values of a polynomial at `samples` equally spaced points and those of its first two
-/// derivatives, over the abscissa `x = (i - h)/h`, h = (samples - 1)/2 (rounded down for even numbers; at least 0.5).
-/// The polynomials are orthonormal over the points, by two Gram-Schmidt passes on `x · p_{k-1}`.
+/// For each degree from 0 on, the values of a polynomial and of its first two derivatives at `samples` equally spaced
+/// points i. The polynomials are functions of `x = (i - h)/h` with h = (samples - 1)/2 (rounded down for even numbers;
+/// at least 0.5). The polynomials are orthonormal over the points, by two Gram-Schmidt passes on `x · p_{k-1}`.
 pub(crate) fn orthonormal_polynomials(samples: usize, degree: usize) -> Vec<[Vec<f64>; 3]> {
     let half = half(samples);
     let abscissa: Vec<f64> = (0..samples).map(|i| (i as f64 - half) / half).collect();

@@ -1,18 +1,20 @@
-//! Position noise in the pass band, estimated from its density just above the cut-off.
+//! Position noise in the pass band of the low-pass, estimated from the spectrum just above the cut-off.
 
 use super::cutoff::{MAX_CUTOFF_SAMPLES, welch};
 
-/// Maximum samples per piece of a spectrum: enough bins between the cut-off and four times the cut-off for a quartile.
+/// Maximum number of samples in a segment of a spectrum. With it, there are enough bins between the cut-off and four
+/// times the cut-off for a quartile.
 const MAX_PIECE_SAMPLES: usize = 1 << 12;
 
-/// Standard deviation of white position noise per sample, for every joint. Its density is the lower quartile of the
-/// spectrum of the uniformly sampled positions `q` between the cut-off and four times the cut-off: the noise that is
-/// also present below the cut-off, where the motion hides it. Zero for a joint whose position never changes, and for
-/// too few samples.
+/// Standard deviation of the white position noise in one sample, for every joint. The density of the noise is the lower
+/// quartile of the spectrum of the uniformly sampled positions `q` between the cut-off and four times the cut-off.
+/// Noise of this density is also present below the cut-off, where the motion hides it. Zero for a joint whose position
+/// never changes, and for too few samples.
 ///
-/// A motion for which the cut-off was chosen has decayed there: its remainder is a noise of far less than a hundredth
-/// of the acceleration below the cut-off. Hence motion is not mistaken for noise, and the estimate is also valid for
-/// positions that were filtered before they were logged, whose spectrum is empty near half the rate.
+/// If the cut-off was selected for the motion, the motion has decayed above it: what remains there corresponds to noise
+/// of far less than a hundredth of the acceleration below the cut-off. Therefore motion is not mistaken for noise. The
+/// estimate is also valid for positions that were filtered before they were logged, whose spectrum is empty near half
+/// the sample rate.
 ///
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, on second differences.
 pub fn position_noise<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
@@ -51,7 +53,7 @@ fn noise_beyond(spectrum: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {
     let bins = spectrum.len();
     let length = 2 * (bins - 1);
     let bin = |hertz: f64| (hertz / rate_hz * length as f64) as usize;
-    // At least eight bins, if necessary the highest ones.
+    // At least eight bins are used, if necessary the highest ones.
     let from = bin(cutoff_hz).clamp(1, bins.saturating_sub(8).max(1));
     let to = bin(4.0 * cutoff_hz).clamp(from + 8, bins.max(from + 8)).min(bins);
     let response = |k: usize| (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4);

@@ -1,16 +1,16 @@
-//! Second-order sections: design of the digital Butterworth low-pass, and its run over three signals.
+//! Second-order sections: design of the digital Butterworth low-pass, and filtering of three signals together.
 
 use crate::error::{FilterError, require};
 use core::f64::consts::PI;
 
-/// `H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)`.
+/// Transfer function `H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)` of one section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
     pub(crate) b: [f64; 3],
     pub(crate) a: [f64; 2],
 }
 
-/// Minimum ratio of the cut-off to the sampling rate: there the gain at zero frequency is accurate to seven digits.
+/// Minimum ratio of the cut-off to the sample rate; with it, the gain at zero frequency is accurate to seven digits.
 const MIN_CUTOFF_RATIO: f64 = 1e-5;
 
 /// Digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off pre-warped,
@@ -31,7 +31,8 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)
         .map(|k| {
-            // Poles s² + 2 d w s + w² with d = sin of the pole's angle from the imaginary axis.
+            // Poles of s² + 2 d w s + w² with the damping d: the sine of the angle between the pole and the imaginary
+            // axis.
             let damping = (PI * (2 * k + 1) as f64 / (2 * order) as f64).sin();
             let square = warped * warped;
             let norm = 1.0 / (1.0 + 2.0 * damping * warped + square);
@@ -49,7 +50,7 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
     Ok(sections)
 }
 
-/// Maximum pole radius of the cascade: transients decay as `radiusⁿ`.
+/// Maximum pole radius of all sections; transients of n samples decay as `radiusⁿ`.
 pub(crate) fn pole_radius(sections: &[Section]) -> f64 {
     sections.iter().fold(0.0_f64, |radius, section| {
         let [a1, a2] = section.a;
@@ -59,11 +60,11 @@ pub(crate) fn pole_radius(sections: &[Section]) -> f64 {
     })
 }
 
-/// Position, first and second difference: three signals that pass through the same recursion.
+/// Position with its first and second difference: three signals that pass the same filter.
 pub(crate) type Triple = [f64; 3];
 
-/// Runs the cascade over `signal` in place (from the end if `reversed`), transposed direct form II. Each section starts
-/// in its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
+/// Filters `signal` in place with all sections (from its end if `reversed`), in transposed direct form II. Each section
+/// starts in its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
 pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, reversed: bool) {
     for some in sections.chunks(2) {
         match some {
@@ -73,9 +74,9 @@ pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, re
     }
 }
 
-/// Runs N sections in one sweep, so that the processor can overlap their recursions.
+/// Applies N sections in one pass, so that the processor can overlap their recursions.
 fn run_together<const N: usize>(sections: [Section; N], signal: &mut [Triple], start: Triple, reversed: bool) {
-    // Unit gain: for constant x, y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
+    // Each section has unit gain. For constant x, y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
     let mut s2 = sections.map(|Section { b: [_, _, b2], a: [_, a2] }| start.map(|x| (b2 - a2) * x));
     let mut s1: [Triple; N] = core::array::from_fn(|k| {
         let Section { b: [_, b1, _], a: [a1, _] } = sections[k];

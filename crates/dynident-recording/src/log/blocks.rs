@@ -5,7 +5,7 @@ use crate::error::RecordingError;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
-/// Capacity of the queue: enough that neither side waits for a slow block of the other.
+/// Capacity of the queue. It is large enough that neither thread waits for a slow block of the other.
 const QUEUE_BLOCKS: usize = 4;
 
 #[derive(Debug)]
@@ -14,7 +14,7 @@ enum Source {
     Thread { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
 }
 
-/// A block or the end, and the rows left out so far.
+/// A block or the end of the log, and the rows omitted so far.
 type Read = (Result<Option<RawBlock>, RecordingError>, LinesDropped);
 
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl RawBlocks {
         Self { label, source: Source::Inline(Box::new(reader)), dropped: LinesDropped::default() }
     }
 
-    /// Reads ahead in a separate thread from now on.
+    /// Starts a separate thread that reads ahead.
     pub(crate) fn in_thread(self) -> Self {
         let Source::Inline(mut reader) = self.source else { return self };
         let (give, blocks) = sync_channel(QUEUE_BLOCKS);
@@ -38,7 +38,7 @@ impl RawBlocks {
             loop {
                 let read = next_of(&mut reader);
                 let is_last = !matches!(read, Ok(Some(_)));
-                // The receiver is gone if the pass ended before the log.
+                // The receiver no longer exists if the pass ended before the log.
                 if give.send((read, reader.dropped().clone())).is_err() || is_last {
                     return;
                 }

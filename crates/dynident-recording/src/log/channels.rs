@@ -1,4 +1,4 @@
-//! The columns of one quantity of all joints, with unit, sign, scale and matrix.
+//! Columns of one quantity of all joints, with unit, sign, scale and matrix.
 
 use super::column_pattern::expand_for_joints;
 use super::units::{Quantity, si_factor, unit_names};
@@ -6,12 +6,12 @@ use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// One column: by name, or by 0-based index.
+/// A column: its name, or its index from 0.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a column is a name in quotes or a 0-based index")]
 pub enum ColumnRef {
-    /// 0-based index.
+    /// Index, from 0.
     Index(usize),
     /// Name in the header; may contain a range such as `q{1..7}_rad`, or `{joint}` for the name of each joint.
     Name(String),
@@ -32,15 +32,15 @@ pub enum Columns {
     List(Vec<ColumnRef>),
 }
 
-/// One value for all columns, or one for each.
+/// One common value, or one value for each column (or joint).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "schema", schemars(rename = "OneOrMany_{T}"))]
 #[serde(untagged, expecting = "give one value for all columns, or a list with one for each")]
 pub enum OneOrMany<T> {
-    /// The same value for all.
+    /// The same value for all columns.
     One(T),
-    /// One value for each.
+    /// One value for each column.
     Many(Vec<T>),
 }
 
@@ -69,8 +69,8 @@ impl<T: Clone> OneOrMany<T> {
 ///
 /// `joint = M · (scale · sign · unit · column) + offset`
 ///
-/// where `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are per
-/// column; `offset` is per joint and in SI (rad, m, N m, N).
+/// Here `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are values for
+/// each column; `offset` is a value for each joint in SI units (rad, m, N m, N).
 ///
 /// ```
 /// let coupled_wrist: dynident_recording::log::ChannelGroup = toml::from_str(
@@ -89,34 +89,35 @@ impl<T: Clone> OneOrMany<T> {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ChannelGroup {
-    /// Another file of the same log, relative to the main file's folder, with the same rows. A range or `{joint}` gives
-    /// one file for each column: `"axis{1..6}.csv"`.
+    /// Another file of the same log with the same rows, relative to the folder of the main file. A range or `{joint}`
+    /// gives one file for each column: `"axis{1..6}.csv"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// One column for each joint of the study, in the study's joint order (any number with a matrix).
+    /// One column for each joint of the study, in the order of the study's joints (any number of columns with a
+    /// matrix).
     pub columns: Columns,
     /// Unit of the columns: `rad` `deg` `rev` `m` `mm`; `rad/s` `deg/s` `rpm` ..; `N m` `N` `A` `mA` ..
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<OneOrMany<String>>,
-    /// Factor in addition to the unit: current gain, gear ratio.
+    /// Factor in addition to the unit, for example current gain or gear ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<OneOrMany<f64>>,
     /// +1 or -1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sign: Option<OneOrMany<f64>>,
-    /// Offset of the joint value, per joint, in SI.
+    /// Offset that is added to the joint value, for each joint, in SI units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<OneOrMany<f64>>,
-    /// `joint = matrix · columns`: one row for each joint, one entry for each column.
+    /// Matrix of `joint = matrix · columns`: one row for each joint, one entry for each column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<Vec<Vec<f64>>>,
-    /// `columns = inverse_matrix · joint`: the joint-to-motor matrix of data sheets; square.
+    /// Square matrix of `columns = inverse_matrix · joint`, as data sheets state it from joints to motors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inverse_matrix: Option<Vec<Vec<f64>>>,
 }
 
 impl ChannelGroup {
-    /// Columns of joint values in SI, in the main file.
+    /// Columns with joint values in SI units, in the main file.
     pub fn new(columns: Columns) -> Self {
         Self {
             file: None,
@@ -130,7 +131,7 @@ impl ChannelGroup {
         }
     }
 
-    /// The columns with expanded ranges; a pattern with `{joint}` is one column.
+    /// The columns with expanded ranges; a pattern with `{joint}` remains one entry.
     ///
     /// # Errors
     /// If a range is malformed or too long.
@@ -138,7 +139,7 @@ impl ChannelGroup {
         self.columns_of(key, &[])
     }
 
-    /// The columns of a study with these joints: one column for each file if there are several files.
+    /// The columns for a study with these joints. If there are several files, one column for each file.
     ///
     /// # Errors
     /// If a range is malformed or too long.
@@ -158,7 +159,7 @@ impl ChannelGroup {
                 }
             }
         }
-        // The same column of several files.
+        // The same column is read from several files.
         let files = self.files(&key, joints)?.len();
         if let ([column], true) = (&list[..], files > 1) {
             list = vec![column.clone(); files];
@@ -166,7 +167,7 @@ impl ChannelGroup {
         Ok(list)
     }
 
-    /// The file of each column; one for all columns, or none for the main file.
+    /// The file of each column: one file for all columns, one for each column, or an empty list for the main file.
     ///
     /// # Errors
     /// If a range is malformed or too long.

@@ -1,11 +1,11 @@
-//! Expands ranges and joint names in the names of columns and files: `"q{1..7}_rad"`, `"effort[{joint}]"`.
+//! Expansion of ranges and joint names in the names of columns and files: `"q{1..7}_rad"`, `"effort[{joint}]"`.
 
 use crate::error::FormatError;
 
-/// Maximum number of columns in a range; protects the memory.
+/// Maximum number of columns in a range; it limits the memory.
 const MAX_COLUMNS: u64 = 4096;
 
-/// Placeholder of the name of each joint of the study.
+/// Placeholder for the name of each joint of the study.
 const JOINT: &str = "{joint}";
 
 /// As [`expand_pattern`]; `effort[{joint}]` gives one name for each of `joints`, in their order.

@@ -31,8 +31,8 @@ impl ColumnSelection {
         Ok(self.fields.len() - 1)
     }
 
-    /// Counts the data rows of the table's source in one pass without parsing numbers. The rows may depend on the
-    /// requested columns. The result is cached in `known`.
+    /// Counts the data rows of the table's source in one pass without parsing numbers. Which rows exist may depend on
+    /// the requested columns. The result is cached in `known`.
     pub(super) fn count_rows(&self, source: &dyn LogSource, known: &RowCount) -> Result<u64, RecordingError> {
         known.of(&self.fields, source.path(), || {
             let (mut table, mut rows) = (source.open()?, 0);
@@ -134,10 +134,10 @@ pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
 
 fn existing_names(requested: &str, names: &[String]) -> String {
     const MAX_SHOWN: usize = 20;
-    // Bounded, because a line of a megabyte may contain half a million names.
+    // The number is limited, because a line of a megabyte may contain half a million names.
     const MAX_COMPARED: usize = 1000;
     let mut likely: Vec<&String> = names.iter().take(MAX_COMPARED).collect();
-    // Of many names, the similar ones are of interest.
+    // If there are many names, the message lists the most similar ones.
     let by_distance = |name: &&String| edit_distance(requested, name);
     let nearest = likely.iter().copied().min_by_key(by_distance).map_or("", String::as_str);
     if names.len() > MAX_SHOWN {
@@ -150,8 +150,8 @@ fn existing_names(requested: &str, names: &[String]) -> String {
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
 }
 
-/// Levenshtein distance over the first 64 characters; a changed digit costs three, because `tau1` is not a misspelling
-/// of `tau2`.
+/// Levenshtein distance (number of changed characters) over the first 64 characters. A changed digit has the distance
+/// three, because `tau1` is usually not a misspelling of `tau2`.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -1,10 +1,10 @@
-//! The value of a field of a text table: a number, a truth value, a date and time, or an entry of a list.
+//! The value in a field of a text table: a number, a truth value, a date and time, or an entry of a list.
 
 use super::plain_row::plain_decimal;
 
-/// The number in a field: in the syntax of the standard library, including `nan` and `inf`, or of Fortran (`1.5D-3`); 1
-/// and 0 for true and false; seconds for a [date and time](seconds) and for `0.5 sec`. A decimal comma is read if
-/// `comma` allows it.
+/// The number in a field. Accepted are the syntax of the standard library, including `nan` and `inf`, and that of
+/// Fortran (`1.5D-3`); true and false (1 and 0); a [date and time](seconds) and `0.5 sec` (seconds). A decimal comma is
+/// accepted if `comma` is true.
 pub(super) fn number(field: &[u8], comma: bool) -> Option<f64> {
     match plain_decimal(field) {
         Some((value, length)) if length == field.len() => return Some(value),
@@ -30,7 +30,7 @@ fn fortran(text: &str) -> Option<f64> {
     text.bytes().all(is_number).then(|| text.replace(['D', 'd'], "e").parse().ok())?
 }
 
-/// Entry number `place` of a list of `count` numbers such as `[0.1, 0.2]`, `(0.1; 0.2)` or `[0.1 0.2]`.
+/// Entry with the index `place` in a list of `count` numbers such as `[0.1, 0.2]`, `(0.1; 0.2)` or `[0.1 0.2]`.
 pub(super) fn entry(field: &[u8], place: usize, count: usize) -> Option<f64> {
     let mut entries = entries(field)?;
     let value = number(entries.nth(place)?, false)?;
@@ -53,8 +53,8 @@ fn entries(field: &[u8]) -> Option<impl Iterator<Item = &[u8]>> {
     Some(inner.split(between).filter(|entry| !entry.is_empty()))
 }
 
-/// Seconds since 1970 of `2026-01-31 10:00:00.5`, with `T` or a blank, and without a zone, with `Z`, or with `+01:00`,
-/// and of the other [notations of the date](days); seconds of the day of `10:00:00.5` or `10:00:00.5 PM`.
+/// Seconds since 1970 for `2026-01-31 10:00:00.5`, with `T` or a blank, and without a time zone, with `Z`, or with
+/// `+01:00`; also for the other [notations of the date](days). Seconds of the day for `10:00:00.5` or `10:00:00.5 PM`.
 fn seconds(text: &str) -> Option<f64> {
     let Some((date, time)) = text.split_once(['T', ' ']) else { return seconds_of_day(text) };
     let Some(days) = days(date) else { return seconds_of_day(text) };
@@ -67,7 +67,7 @@ fn seconds(text: &str) -> Option<f64> {
             (&time[..at], if time[at..].starts_with('-') { -zone_s } else { zone_s })
         }
     };
-    // The basic form `100000.5` of ISO 8601.
+    // Basic format of ISO 8601, for example `100000.5`.
     let of_day_s = match (time.get(..2), time.get(2..4), time.get(4..)) {
         (Some(hours), Some(minutes), Some(rest)) if !time.contains(':') => {
             seconds_of_day(&format!("{hours}:{minutes}:{rest}"))?
@@ -77,8 +77,8 @@ fn seconds(text: &str) -> Option<f64> {
     Some(86_400.0 * days as f64 + (of_day_s - zone_s))
 }
 
-/// Days since 1970 of `2026-01-31`, `20260131`, `2026/1/31`, `31.1.2026`, and `1/31/2026`, where the day is first if
-/// the first number is above 12.
+/// Days since 1970 for `2026-01-31`, `20260131`, `2026/1/31`, `31.1.2026` and `1/31/2026`. In the last notation, the
+/// first number is the day if it is above 12.
 fn days(date: &str) -> Option<i64> {
     let short = |text: &str| (text.len() <= 2).then(|| digits(text, text.len()))?;
     let parts = |separator: char| date.split(separator).collect::<Vec<&str>>();
@@ -124,8 +124,8 @@ fn digits(text: &str, count: usize) -> Option<i64> {
     (text.len() == count && text.bytes().all(|byte| byte.is_ascii_digit())).then(|| text.parse().ok())?
 }
 
-/// Days from 1970-01-01 in the Gregorian calendar. The year starts in March, so that the leap day is its last; the
-/// months from March have 153 days in five.
+/// Days since 1970-01-01 in the Gregorian calendar. The year is taken to start in March, so that the leap day is its
+/// last day; from March on, five months have 153 days.
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;

@@ -1,4 +1,4 @@
-//! A file of any format as a source of rows.
+//! A file of any supported format as a source of rows.
 
 use super::format::{Header, LogFormat};
 use super::part::PartTable;
@@ -29,8 +29,8 @@ pub struct FileLog {
 }
 
 impl FileLog {
-    /// The file at `path`; `header` and `delimiter` of `format` apply to text, `part` to a file with several
-    /// recordings. Does not read the file.
+    /// A file at `path`. `header` and `delimiter` of `format` apply to text, `part` to a file with several recordings.
+    /// Does not read the file yet.
     pub fn new(path: &Path, format: &LogFormat) -> Self {
         Self {
             path: path.to_owned(),
@@ -42,7 +42,7 @@ impl FileLog {
         }
     }
 
-    /// The file at `path`; header and delimiter of a text file are detected.
+    /// A file at `path`, without a format: header and delimiter of a text file are detected.
     pub fn described_by_itself(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -59,7 +59,7 @@ impl FileLog {
     /// # Errors
     /// If it cannot be read, does not contain a table, or changed since the first pass.
     pub fn open_with_format(&self) -> Result<(FileFormat, Box<dyn LogTable>), RecordingError> {
-        // Errors in listing files are reported when the file is opened.
+        // Errors in listing the files are reported when the file is opened.
         for file in dynident_formats::files(&self.path).unwrap_or_default() {
             if self.seen.is_unchanged(&file).is_ok_and(|unchanged| !unchanged) {
                 return Err(RecordingError::Changed { file });
@@ -96,13 +96,14 @@ impl LogSource for FileLog {
         Some(&self.path)
     }
 
-    /// Number of rows in the file's metadata; for text, estimated from the file size and the length of the first lines.
+    /// Number of rows from the file's metadata. For text, it is estimated from the file size and the length of the
+    /// first lines.
     fn estimated_rows(&self) -> Option<u64> {
         use std::io::Read;
         match dynident_formats::open(&self.path).ok()?.contents {
             Contents::Table(table) => table.estimated_rows(),
             Contents::Text(mut text) => {
-                // Of a SAGE recording, the measurements are the last text.
+                // In a SAGE recording, the last text file contains the measurements.
                 let files = dynident_formats::files(&self.path).ok()?;
                 let file = files.iter().find(|file| file.ends_with(SAGE_FILES[1])).unwrap_or(&self.path);
                 let size = std::fs::metadata(file).ok()?.len();

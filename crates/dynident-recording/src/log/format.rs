@@ -14,12 +14,12 @@ use std::path::PathBuf;
 #[serde(from = "WrittenHeader", into = "WrittenHeader")]
 #[non_exhaustive]
 pub enum Header {
-    /// Yes, unless every field of the first row is a number.
+    /// The first row contains the names, unless every field of it is a number.
     #[default]
     Auto,
-    /// Yes.
+    /// The first row contains the names.
     Present,
-    /// No: columns are addressed by 0-based index.
+    /// The first row contains values; columns are addressed by their index from 0.
     Absent,
 }
 
@@ -80,7 +80,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// Unit length, s.
+    /// Length of the unit, s.
     pub fn seconds(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
@@ -96,20 +96,20 @@ impl TimeUnit {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TimeColumn {
-    /// Name or 0-based index, in the main file or in `file`.
+    /// Name or index (from 0) of the column, in the main file or in `file`.
     pub column: ColumnRef,
-    /// Another file of the same log, relative to the main file's folder, with the same rows.
+    /// Another file of the same log with the same rows, relative to the folder of the main file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Unit of the stamps; seconds by default.
     #[serde(default)]
     pub unit: TimeUnit,
-    /// Further factor on the stamps (tick length); 1 by default.
+    /// Additional factor on the time stamps, for example the length of a tick; 1 by default.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Largest difference of the stamps of one row, s, if other files of the log have a column of this name too. A
-    /// larger one shows that the files do not belong together. Default 0.1, five samples of a servo bus; the files of
-    /// published SAGE recordings have equal stamps.
+    /// Largest difference between the time stamps in one row, s, if other files of the log also have a column of this
+    /// name. A larger difference shows that the files do not belong together. Default 0.1, which is five samples of a
+    /// servo bus; the files of published SAGE recordings have equal stamps.
     #[serde(default = "max_difference_s", skip_serializing_if = "is_default_difference")]
     pub max_difference_s: f64,
 }
@@ -133,7 +133,7 @@ fn is_default_difference(value: &f64) -> bool {
 }
 
 impl TimeColumn {
-    /// Stamps in seconds.
+    /// Column with time stamps in seconds.
     pub fn seconds(column: ColumnRef) -> Self {
         Self { column, file: None, unit: TimeUnit::Seconds, scale: one(), max_difference_s: max_difference_s() }
     }
@@ -148,7 +148,7 @@ pub enum Missing {
     /// Stop with an error.
     #[default]
     Error,
-    /// Leave the row out; a short hole is interpolated, a long one splits the log.
+    /// Omit the row. A short hole is interpolated, a long one splits the log.
     Drop,
 }
 
@@ -158,14 +158,14 @@ pub enum Missing {
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum ClockRule {
-    /// Decided from the data, see [`Clock`](crate::clock::Clock).
+    /// Dynident decides from the data; see [`Clock`](crate::clock::Clock).
     #[default]
     Auto,
-    /// Equal steps; only the mean rate is taken from the stamps.
+    /// Samples are evenly spaced; only the mean rate is taken from the stamps.
     Uniform,
-    /// Samples at the stamps, interpolated to a uniform grid.
+    /// Samples were taken at the stamps; they are interpolated to a uniform grid.
     Stamps,
-    /// A slowly changing rate; the stamps jitter and are smoothed.
+    /// The rate changes slowly and the stamps jitter; the stamps are smoothed.
     Smoothed,
 }
 
@@ -188,21 +188,21 @@ pub enum ClockRule {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogFormat {
-    /// Whether the first row names the columns.
+    /// Whether the first row contains the names of the columns.
     #[serde(default)]
     pub header: Header,
-    /// `","`, `";"`, `"\t"` or `" "` (any number of spaces); detected from the first line by default.
+    /// Separator: `","`, `";"`, `"\t"` or `" "` (any number of spaces); detected from the first line by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delimiter: Option<char>,
-    /// Whether a text has one line for each quantity and one value for each sample. Columns are then lines. Lines with
-    /// names are recognised without this key. Default false.
+    /// Whether a text file has one line for each quantity, with one value for each sample. The keys for columns then
+    /// refer to lines. Files whose lines begin with names are recognised without this key. Default false.
     #[serde(default, skip_serializing_if = "is_false")]
     pub transposed: bool,
-    /// The recording in a file with several: an episode, `"data.demo_3"`. Names of columns follow this name. The whole
-    /// file by default.
+    /// The recording to use in a file with several recordings, for example an episode: `"data.demo_3"`. Names of
+    /// columns are then relative to this name. The whole file by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<String>,
-    /// The time column; otherwise `rate_hz` is required.
+    /// Time column; without it, `rate_hz` is required.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<TimeColumn>,
     /// Sampling rate of a log without a time column, Hz.
@@ -219,37 +219,38 @@ pub struct LogFormat {
     /// Joint torques or motor currents. A log without them needs `command`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque: Option<ChannelGroup>,
-    /// Commanded positions, for robots behind position loops: the target that was sent to each servo, in rad (m) after
-    /// unit, scale and offset. In addition to `torque` or in place of it.
+    /// Commanded positions, for robots with internal position controllers: the target that was sent to each servo, in
+    /// rad (m) after unit, scale and offset. They can be given in addition to `torque` or instead of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<ChannelGroup>,
     /// Joint temperatures, °C, for temperature-dependent friction. Convert other units by `scale` and `offset`; several
     /// joints may use the same column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ChannelGroup>,
-    /// Data rows `[first, end)`, 0-based, without header and comments.
+    /// Range of data rows to use, `[first, end)`, counted from 0 without header and comments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<[u64; 2]>,
-    /// Share of the data rows, `[0.0, 0.65]` = the first 65 %: rows `[round(a n), round(b n))`.
+    /// Share of the n data rows to use: `[0.0, 0.65]` is the first 65 %. For `[a, b]`, rows `[round(a n), round(b n))`
+    /// are used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fraction: Option<[f64; 2]>,
-    /// Seconds `[from, to)` after the first data row of the file.
+    /// Time range to use, `[from, to)`, s after the first data row of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_range_s: Option<[f64; 2]>,
-    /// Keep one row in n, for a recorder that repeats values: `3` keeps rows 0, 3, 6 and so on. All other keys apply to
-    /// the kept rows; `rate_hz` remains the rate of the file. Default 1.
+    /// Keeps one row in n, for a recorder that repeats values: `3` keeps rows 0, 3, 6 and so on. All other keys apply
+    /// to the kept rows; `rate_hz` remains the rate of the file. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keep_every: Option<u64>,
-    /// Ranges of data rows `[first, end)`, 0-based, that are left out.
+    /// Ranges of data rows `[first, end)`, counted from 0, that are omitted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_rows: Vec<[u64; 2]>,
-    /// Time ranges `[from, to)`, s after the first data row of the file, that are left out.
+    /// Time ranges `[from, to)`, s after the first data row of the file, that are omitted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_time_s: Vec<[f64; 2]>,
-    /// Rows that satisfy one of these rules are left out.
+    /// Rows that satisfy one of these rules are omitted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drop_where: Vec<RowRule>,
-    /// Rows that violate one of these rules are left out.
+    /// Rows that violate one of these rules are omitted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keep_where: Vec<RowRule>,
     /// Treatment of rows with an empty, NaN or infinite field.
@@ -258,11 +259,11 @@ pub struct LogFormat {
     /// Interpretation of time stamps.
     #[serde(default)]
     pub clock: ClockRule,
-    /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
+    /// Number of median steps above which a step between samples splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
-    /// Whether to fill a longer gap if it is short compared with the motion (at most a fifth of the cut-off's period).
-    /// The filled samples are not used as rows. True by default.
+    /// Whether to fill a longer gap if it is short compared with the motion (at most a fifth of the period of the
+    /// cut-off frequency). The filled samples are not used as rows of the fit. True by default.
     #[serde(default = "yes")]
     pub bridge_gaps: bool,
 }
@@ -276,7 +277,7 @@ fn default_max_gap_steps() -> f64 {
 }
 
 impl LogFormat {
-    /// A log with a time column; all other keys have their defaults.
+    /// Format of a log with a time column; all other keys have their defaults.
     pub fn with_time(time: TimeColumn, position: ChannelGroup, torque: ChannelGroup) -> Self {
         Self {
             header: Header::default(),
@@ -306,13 +307,13 @@ impl LogFormat {
         }
     }
 
-    /// As [`with_time`](Self::with_time), for samples at an even rate without stamps.
+    /// Format of a log with an even sample rate and without stamps; all other keys have their defaults.
     pub fn at_rate(rate_hz: f64, position: ChannelGroup, torque: ChannelGroup) -> Self {
         let time = TimeColumn::seconds(ColumnRef::Index(0));
         Self { time: None, rate_hz: Some(rate_hz), ..Self::with_time(time, position, torque) }
     }
 
-    /// Checks the format, also against the study's joints.
+    /// Checks the format, including its agreement with the study's joints.
     ///
     /// # Errors
     /// A [`FormatError`] that names the key and the fix.

@@ -1,4 +1,4 @@
-//! The rules by which rows are left out, with resolved columns.
+//! The rules by which rows are omitted, with the indices of their columns.
 
 use super::channels::ColumnRef;
 use super::format::LogFormat;
@@ -13,7 +13,7 @@ pub(super) struct FoundRules {
 }
 
 impl FoundRules {
-    /// The rules of `format`; `want` returns the slot of a column.
+    /// Resolves the rules of `format`; `want` requests a column and returns the index of its values.
     pub(super) fn new<E>(
         format: &LogFormat,
         mut want: impl FnMut(&str, &ColumnRef) -> Result<usize, E>,

@@ -6,23 +6,23 @@ use memchr::memchr;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Maximum line length; a log row of a humanoid has a few thousand bytes.
+/// Maximum length of a line; a row of a humanoid's log has a few thousand bytes.
 const MAX_LINE_BYTES: usize = 1 << 20;
-/// Initial buffer size, bytes: reads of this size bypass the buffer of an underlying reader.
+/// Initial size of the buffer, bytes. Reads of this size bypass the buffer of an underlying reader.
 const BUFFER_BYTES: usize = 1 << 19;
 
 pub(super) struct Lines {
     path: PathBuf,
     text: Box<dyn Read + Send>,
-    /// Unprocessed bytes; the current line is not copied.
+    /// Bytes that were read; the current line is not copied.
     buffer: Vec<u8>,
     filled: usize,
-    /// The current line with its newline.
+    /// Range of the current line in the buffer, including its newline.
     line: Range<usize>,
     ended: bool,
     /// 1-based number of the current line.
     number: u64,
-    /// Whether the current line ends with a newline; a last line without one may be truncated.
+    /// Whether the current line ends with a newline. A last line without a newline may be truncated.
     complete: bool,
 }
 
@@ -69,7 +69,7 @@ impl Lines {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Moves to the next line that is neither blank nor a comment; false at the end of the file.
+    /// Moves to the next line that is neither blank nor a comment; returns false at the end of the file.
     pub(super) fn advance(&mut self) -> Result<bool, RecordingError> {
         loop {
             self.next_line()?;

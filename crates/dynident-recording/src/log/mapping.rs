@@ -1,13 +1,13 @@
-//! Converts columns to joint values: unit, sign, scale, matrix, offset.
+//! Conversion of columns to joint values: unit, sign, scale, matrix, offset.
 
 use super::channels::{ChannelGroup, ColumnRef};
 use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
 
-/// `joint = matrix · column + offset`; the matrix includes unit, sign and scale.
+/// Conversion `joint = matrix · column + offset`; the matrix includes unit, sign and scale.
 #[derive(Clone, Debug)]
 pub(crate) struct Mapping {
-    /// For each joint: the columns with nonzero factors, and the factors.
+    /// For each joint, the columns with nonzero factors and these factors.
     terms: Vec<Vec<(usize, f64)>>,
     offset: Vec<f64>,
 }
@@ -42,7 +42,7 @@ impl Mapping {
         Ok(Self { terms, offset })
     }
 
-    /// Fills `out` (one vector for each joint) from raw `columns`.
+    /// Computes the joint values `out` (one vector for each joint) from the raw `columns`.
     pub(crate) fn apply(&self, columns: &[Vec<f64>], out: &mut [Vec<f64>]) {
         for ((terms, offset), out) in self.terms.iter().zip(&self.offset).zip(out) {
             out.clear();
@@ -76,8 +76,8 @@ impl ChannelGroup {
         unit * scale * sign
     }
 
-    /// The columns that give these values of the joints, in SI, by the inverse of the conversion: `(joint - offset) /
-    /// (scale · sign · unit)`, with the names of the columns.
+    /// Inverts the conversion: computes the columns that correspond to these joint values (SI units),
+    /// `(joint - offset) / (scale · sign · unit)`, with the names of the columns.
     ///
     /// # Errors
     /// Another number of columns than of joints; a matrix, or a factor of zero.

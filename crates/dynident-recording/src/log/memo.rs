@@ -1,4 +1,4 @@
-//! Caches a result about a log for all passes over it.
+//! Storage of a result about a log, so that it is computed only once for all passes.
 
 use super::Log;
 use super::format::LogFormat;
@@ -6,7 +6,7 @@ use core::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// The last result and its validity. The type of the result is defined by modules above this one.
+/// The last result, and what it is valid for. The modules above this one define the type of the result.
 #[derive(Debug, Default)]
 pub(super) struct Memo(Mutex<Option<Cached>>);
 
@@ -17,7 +17,7 @@ struct Cached {
     result: Arc<dyn Any + Send + Sync>,
 }
 
-/// The format and the file for which a result is valid; both may change between passes.
+/// The format and the file for which a result is valid. Both may change between passes.
 #[derive(Debug, PartialEq)]
 struct About {
     format: LogFormat,
@@ -26,8 +26,8 @@ struct About {
 }
 
 impl Log {
-    /// Result of `find` for this log's times, positions and torques. The result is cached until the file, the format or
-    /// the `settings` of `find` change; clones with the same format share it.
+    /// Returns the result of `find`, which is computed from this log's times, positions and torques. The result is
+    /// stored until the file, the format or the `settings` of `find` change; clones with the same format share it.
     ///
     /// # Errors
     /// Those of `find`; errors are not cached.

@@ -1,4 +1,4 @@
-//! Samples in memory as a log: joint values in SI, or a table of numbers.
+//! Samples in memory as a log: joint values in SI units, or a table of numbers.
 
 use super::Log;
 use super::channels::{ChannelGroup, ColumnRef, Columns};
@@ -8,7 +8,7 @@ use crate::error::RecordingError;
 use crate::place::LogPlace;
 use std::sync::Arc;
 
-/// Samples of all joints in SI and in joint order; `q[j]` contains joint j.
+/// Samples of all joints in SI units, in the order of the joints: `q[j]` contains joint j.
 ///
 /// ```
 /// use dynident_recording::{JointSamples, MotionBlock, MotionSettings, MotionStream};
@@ -49,7 +49,7 @@ pub struct JointSamples {
 pub enum SampleClock {
     /// Sampling rate, Hz.
     RateHz(f64),
-    /// Times, s; their jitter is evaluated as for a file ([`ClockRule`](super::ClockRule)).
+    /// Times, s; their jitter is treated as for a file ([`ClockRule`](super::ClockRule)).
     TimesS(Vec<f64>),
 }
 
@@ -97,7 +97,7 @@ impl JointSamples {
         let (velocity, acceleration) = (optional("dq", self.dq)?, optional("ddq", self.ddq)?);
         let temperature = optional("temperature_c", self.temperature_c)?;
         let command = optional("command", self.command)?;
-        // Replaced by the torque of the samples, if any.
+        // It is replaced by the torque of the samples, if there is one.
         let format = match rate_hz {
             Some(rate_hz) => LogFormat::at_rate(rate_hz, position.clone(), position),
             None => LogFormat::with_time(TimeColumn::seconds(ColumnRef::Index(0)), position.clone(), position),
@@ -139,13 +139,13 @@ pub struct MemoryLog {
 }
 
 enum Values {
-    /// Entry `row * width + column`.
+    /// Rows one after another: value `row * width + column`.
     RowMajor(Vec<f64>),
     Columns(Vec<Vec<f64>>),
 }
 
 impl MemoryLog {
-    /// A table with `values[i * width + k]` in row i and column k.
+    /// Creates a table with `values[i * width + k]` in row i and column k.
     ///
     /// # Errors
     /// [`RecordingError::Samples`] if the last row is incomplete, or the number of names is not `width`.
@@ -163,7 +163,7 @@ impl MemoryLog {
         Self::new(label, names, width, rows, Values::RowMajor(values))
     }
 
-    /// A table with the columns `columns[k]`.
+    /// Creates a table with the columns `columns[k]`.
     ///
     /// # Errors
     /// [`RecordingError::Samples`] if the columns differ in length, or the number of names differs from that of
@@ -198,7 +198,7 @@ impl MemoryLog {
         self.names.as_deref()
     }
 
-    /// Whether both are clones of one table.
+    /// Whether both objects are clones of the same table.
     pub fn is_same_table(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.values, &other.values)
     }

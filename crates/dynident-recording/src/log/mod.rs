@@ -1,11 +1,11 @@
-//! Reads joint values in SI from logs.
+//! Reading of joint values in SI units from logs.
 //!
 //! [`LogSource`] provides rows of numbers: [`FileLog`] (a file in any supported format), [`MemoryLog`] and
 //! [`JointSamples`] (arrays), or a type of the caller. [`LogFormat`] maps columns to quantities, and a [`Log`] combines
-//! both. [`LogReader`] is one pass over a log: it pairs files, applies units, signs, gears and ranges
-//! ([`ChannelGroup`]), treats missing values, and fills [`RawBlock`]s.
+//! both. [`LogReader`] makes one pass over a log: it combines the files, applies units, signs, gear ratios and ranges
+//! ([`ChannelGroup`]), treats missing values, and returns [`RawBlock`]s.
 //!
-//! Binary file formats are read by dynident-formats; add new formats there. Text tables are parsed here.
+//! The crate dynident-formats reads binary file formats; add new formats there. Text tables are parsed here.
 
 mod blocks;
 mod channels;
@@ -52,7 +52,7 @@ use row_count::RowCount;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The files of `path`: itself, or the parts in the folder of a rosbag2 recording.
+/// The files of a recording: `path` itself, or the parts in the folder of a rosbag2 recording.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.
@@ -62,23 +62,23 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, crate::RecordingErr
 
 /// A recording: source of rows, mapping of columns, and names of joints.
 ///
-/// Reading starts with a pass. Any number of passes is possible, also by several threads at once.
+/// The samples are read when a pass starts. Any number of passes is possible, also by several threads at once.
 #[derive(Clone, Debug)]
 pub struct Log {
     source: Arc<dyn LogSource>,
-    /// For a format with a fraction of the rows.
+    /// Number of rows, which is needed for a format that selects a fraction of the rows.
     row_count: Arc<RowCount>,
     memo: Arc<Memo>,
     /// Mapping of the columns, and selection of rows.
     pub format: LogFormat,
     /// Names of the joints, in the order of the format's columns.
     pub joints: Vec<String>,
-    /// Intervals whose torque is ignored; motion and clock use all rows.
+    /// Time intervals whose torque is ignored; motion and clock use all rows.
     pub ignored_torque: Vec<IgnoredTorque>,
 }
 
 impl Log {
-    /// Rows of `source`, interpreted by `format`.
+    /// Creates a log from the rows of `source`, interpreted by `format`.
     pub fn new(source: impl LogSource + 'static, format: LogFormat, joints: &[String]) -> Self {
         Self::shared(Arc::new(source), format, joints)
     }
@@ -95,7 +95,8 @@ impl Log {
         }
     }
 
-    /// The log with its main file at `path`; the `file` keys of channel groups are relative to its folder.
+    /// Creates a log from the file at `path`. The `file` keys of channel groups are relative to the folder of this
+    /// file.
     pub fn file(path: &Path, format: LogFormat, joints: &[String]) -> Self {
         let source = Arc::new(FileLog::new(path, &format));
         Self::shared(source, format, joints)

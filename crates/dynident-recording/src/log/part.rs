@@ -1,10 +1,10 @@
-//! One part of a file with several recordings: the columns whose names begin with its name.
+//! One recording in a file with several recordings: the columns whose names begin with its name.
 
 use super::source::{LogGroup, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// The columns `PART.NAME` of a table, as `NAME`.
+/// A table with only the columns `PART.NAME` of another table, named `NAME`.
 #[derive(Debug)]
 pub(super) struct PartTable {
     table: Box<dyn LogTable>,
@@ -14,7 +14,7 @@ pub(super) struct PartTable {
 }
 
 impl PartTable {
-    /// The columns of `part` in `table`.
+    /// Selects the columns of `part` in `table`.
     ///
     /// # Errors
     /// A table without columns of this part.

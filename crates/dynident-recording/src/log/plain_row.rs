@@ -1,16 +1,16 @@
-//! Fast path for rows in the usual notation: numbers of few digits, no blanks, no quotes.
+//! Fast parser for rows in the usual notation: numbers with few digits, no blanks, no quotes.
 //!
 //! [`TextTable`](super::text::TextTable) reads other rows field by field.
 
 use memchr::memchr2;
 
-/// Maximum number of digits that is always exact as a double.
+/// Maximum number of digits that a double represents exactly.
 const MAX_DIGITS: usize = 15;
 const POWERS: [f64; MAX_DIGITS + 1] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// Reads the fields of `line` that have an index into `values` in `places` (one entry per field); false if the number
-/// of fields differs, or if a field needs the general parser.
+/// Reads the fields of `line` into `values`. `places` contains for each field its index in `values`, or `None` for a
+/// field that is not needed. Returns false if the number of fields differs, or if a field needs the general parser.
 pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>], values: &mut [f64]) -> bool {
     let mut rest = line;
     for (field, place) in places.iter().enumerate() {
@@ -39,14 +39,14 @@ pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>
     true
 }
 
-/// A field with an exponent or more digits; NaN for an empty field.
+/// Value of a field with an exponent or with more digits; NaN for an empty field.
 fn other_number(field: &[u8]) -> Option<f64> {
     let field = field.trim_ascii();
     if field.is_empty() { Some(f64::NAN) } else { core::str::from_utf8(field).ok()?.parse().ok() }
 }
 
-/// The number such as `-12.345678` at the start of `text`, and its length. The digits as an integer below 2⁵³ and the
-/// power of ten are exact, so that one division rounds correctly.
+/// Reads a number such as `-12.345678` at the start of `text`, and returns it with its length. The digits as an integer
+/// below 2⁵³ and the power of ten are both exact, so a single division gives the correctly rounded result.
 pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     let sign = usize::from(text.first() == Some(&b'-'));
     let digits = &text[sign..];
@@ -70,7 +70,7 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
         }
         length = count + 1;
     }
-    // More digits need the general parser.
+    // Numbers with more digits need the general parser.
     if count == 0 || digit(length).is_some() {
         return None;
     }
@@ -78,7 +78,8 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     Some((if sign == 1 { -value } else { value }, sign + length))
 }
 
-/// Parses eight digits at once: pairs, then fours, then all. Source: Lemire, Softw. Pract. Exp. 51 (2021) 1700.
+/// Parses eight digits at once: first pairs of digits, then groups of four, then all eight. Source: Lemire, Softw.
+/// Pract. Exp. 51 (2021) 1700.
 fn eight_digits(text: [u8; 8]) -> Option<u64> {
     let bytes = u64::from_le_bytes(text);
     let upper_halves = 0xF0F0_F0F0_F0F0_F0F0;

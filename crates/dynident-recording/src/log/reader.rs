@@ -1,4 +1,5 @@
-//! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
+//! Logs as a stream of blocks: several files, ranges of rows, mapping to joints. The memory does not grow with the
+//! length of the log.
 
 use super::channels::ColumnRef;
 use super::columns::ColumnSelection;
@@ -12,17 +13,17 @@ use super::{FileLog, Log};
 use crate::error::RecordingError;
 use std::path::{Path, PathBuf};
 
-/// Maximum position or torque: its squares and its second differences per second squared are finite.
+/// Maximum position or torque. Below it, squares and second differences per second squared are finite.
 const MAX_VALUE: f64 = 1e60;
 
 const MAX_BLOCK_ROWS: usize = 4096;
 
-/// Successive rows of a log in joint values (SI), as logged: no filter, no resampling.
+/// Successive rows of a log as joint values in SI units, as logged: without filter or interpolation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawBlock {
-    /// 0-based data row in the file of each sample; not contiguous where rows were left out.
+    /// Data row in the file of each sample, from 0. Where rows were omitted, the numbers are not contiguous.
     pub row: Vec<u64>,
-    /// Seconds after the first data row of the file.
+    /// Time of each sample, s after the first data row of the file.
     pub time_s: Vec<f64>,
     /// Positions, one vector for each joint (rad, m).
     pub q: Vec<Vec<f64>>,
@@ -45,13 +46,13 @@ impl RawBlock {
     }
 }
 
-/// Rows that the reader left out.
+/// Rows that the reader omitted.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LinesDropped {
-    /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
+    /// Number of rows with an empty, NaN or infinite field, with `missing = "drop"`.
     pub missing: u64,
-    /// Rows left out by `drop_rows`, `drop_time_s`, `drop_where` and `keep_where`.
+    /// Number of rows that `drop_rows`, `drop_time_s`, `drop_where` and `keep_where` exclude.
     #[serde(default)]
     pub by_rule: u64,
     /// File and line of a truncated last row.
@@ -61,22 +62,24 @@ pub struct LinesDropped {
 #[derive(Debug)]
 struct Group {
     quantity: Quantity,
-    /// Table and slot of each column.
+    /// For each column, the index of its table and the index of its value in a row of this table.
     slots: Vec<(usize, usize)>,
     mapping: Mapping,
     columns: Vec<Vec<f64>>,
 }
 
-/// One pass over a log: converts raw columns to joint values in SI and applies ranges and rules for missing values.
+/// One pass over a log: converts raw columns to joint values in SI units, and applies ranges of rows and rules for
+/// missing values.
 #[derive(Debug)]
 pub struct LogReader {
     label: String,
     joints: Vec<String>,
     tables: Vec<ColumnSelection>,
     groups: Vec<Group>,
-    /// Table and slot of the time column, and its factor to seconds.
+    /// Time column: index of its table, index of its value in a row, and factor to seconds.
     time: Option<(usize, usize, f64)>,
-    /// Table and slot of columns of the same name in other files, and the largest difference to the time column, s.
+    /// Columns with the name of the time column in other files (table and index of the value); `max_difference_s` is
+    /// the largest permitted difference from the time column, s.
     other_stamps: Vec<(usize, usize)>,
     max_difference_s: f64,
     period_s: f64,
@@ -150,7 +153,7 @@ impl LogReader {
         })
     }
 
-    /// Rows and lines left out so far.
+    /// Rows and lines omitted so far.
     pub fn dropped(&self) -> &LinesDropped {
         &self.dropped
     }
@@ -228,7 +231,7 @@ impl LogReader {
             self.finished = true;
             return Ok(());
         }
-        // Always read the first row, because times are relative to it.
+        // The first row is always read, because times are relative to it.
         if self.next_row > 0 && self.next_row < self.rows[0] {
             return self.skip_row();
         }
@@ -253,7 +256,8 @@ impl LogReader {
         let time_s = match self.time {
             Some((table, slot, seconds)) => {
                 let stamp = self.stamps.next(self.tables[table].values[slot]);
-                // Subtract stamps before scaling: nanoseconds since 1970 lose precision in the multiplication.
+                // The difference of stamps is computed before scaling, because nanoseconds since 1970 would lose
+                // precision in a multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
             None => row as f64 * self.period_s,
@@ -276,7 +280,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// Checks that the files of one log have the same time in a row.
+    /// Checks that all files of a log have the same time in a row.
     fn check_stamps(&self, row: u64) -> Result<(), RecordingError> {
         let Some((table, slot, seconds)) = self.time else { return Ok(()) };
         let stamp = self.tables[table].values[slot];
@@ -295,7 +299,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// Skips the rows of the tables between two that `keep_every` keeps; returns a table that ended.
+    /// Skips the rows of the tables between two rows that `keep_every` keeps. Returns the index of a table that ended.
     fn skip_thinned(&mut self) -> Result<Option<usize>, RecordingError> {
         let mut ended = None;
         for _ in 1..if self.next_row > 0 { self.keep_every } else { 1 } {
@@ -311,7 +315,7 @@ impl LogReader {
         Ok(ended)
     }
 
-    /// Skips a row before the first requested one.
+    /// Skips a row before the first row to use.
     fn skip_row(&mut self) -> Result<(), RecordingError> {
         let mut ended = self.skip_thinned()?;
         let skipped = if ended.is_some() { &mut [][..] } else { &mut self.tables[..] };
@@ -325,7 +329,7 @@ impl LogReader {
         ended.map_or(Ok(()), |index| self.check_ends(index))
     }
 
-    /// Leaves out a row with a missing value in table `index`, if a rule or the settings allow it.
+    /// Omits a row with a missing value in table `index`, if a rule or the settings permit this.
     fn leave_out_missing(&mut self, row: u64, index: usize) -> Result<(), RecordingError> {
         let values = &self.tables[0].values;
         let since = |stamp: f64| {
@@ -333,7 +337,7 @@ impl LogReader {
         };
         let stamp = |(table, slot, _): (usize, usize, f64)| since(self.tables[table].values[slot]);
         let time_s = self.time.map_or(row as f64 * self.period_s, stamp);
-        // Rows that a rule leaves out may contain invalid values.
+        // Rows that a rule excludes may contain invalid values.
         if self.rules.drops(row, time_s, values) {
             self.dropped.by_rule += u64::from(row >= self.rows[0]);
             return Ok(());
@@ -345,7 +349,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// Checks that the files of one log end together; one truncated last row is tolerated.
+    /// Checks that all files of a log end at the same row; one truncated last row is tolerated.
     fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
         for table in &self.tables {
             if let Some(place) = table.table.truncated() {
@@ -364,7 +368,7 @@ impl LogReader {
     }
 }
 
-/// Table and slot of the columns in other files that have the name of the time column.
+/// Columns in other files that have the name of the time column: index of the table, and index of the value in a row.
 fn other_stamps(format: &LogFormat, own: Option<usize>, tables: &mut [ColumnSelection]) -> Vec<(usize, usize)> {
     let (Some(time), Some(own)) = (&format.time, own) else { return Vec::new() };
     let ColumnRef::Name(name) = &time.column else { return Vec::new() };

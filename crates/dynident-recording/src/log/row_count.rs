@@ -1,4 +1,4 @@
-//! Caches the number of rows of a source for all passes over it.
+//! Storage of the number of rows of a source, so that rows are counted only once for all passes.
 
 use crate::error::RecordingError;
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::time::SystemTime;
 #[derive(Debug, Default)]
 pub(super) struct RowCount(Mutex<Option<(Counted, u64)>>);
 
-/// Columns and file for which a count is valid: the rows may depend on the columns, and the file may change.
+/// Columns and file for which a row count is valid. The rows may depend on the columns, and the file may change.
 #[derive(Debug, PartialEq)]
 struct Counted {
     fields: Vec<usize>,
@@ -16,7 +16,7 @@ struct Counted {
 }
 
 impl RowCount {
-    /// Number of rows of the source with these columns, cached until the columns or the file at `path` change.
+    /// Number of rows of the source with these columns. It is stored until the columns or the file at `path` change.
     pub(super) fn of(
         &self,
         fields: &[usize],

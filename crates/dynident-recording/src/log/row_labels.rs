@@ -1,13 +1,13 @@
-//! Names of joints in the text fields of a row, which belong to the numbers in its other fields: `name0, name1,
-//! position0, position1`, or lists `['a', 'b']` and `[0.1, 0.2]` in columns `name` and `position`.
+//! Names of joints in text fields of a row, which belong to numbers in other fields of the row:
+//! `name0, name1, position0, position1`, or lists `['a', 'b']` and `[0.1, 0.2]` in the columns `name` and `position`.
 
 use super::field::number;
 use super::text_columns::Column;
 
-/// The names in the first row, and the columns that they belong to.
+/// Names in the first row, and the columns to which they belong.
 #[derive(Clone, Debug)]
 pub(super) struct RowLabels {
-    /// Fields with the names: one with a list, or one for each.
+    /// Fields with the names: one field with a list, or one field for each name.
     fields: Vec<usize>,
     is_list: bool,
     /// Texts of these fields in the first row.
@@ -17,12 +17,12 @@ pub(super) struct RowLabels {
     quantities: Vec<Vec<Column>>,
 }
 
-/// Places of the names of the first row in another row; `None` for a missing name.
+/// For each name of the first row, its position in another row; `None` for a missing name.
 pub(super) type Order = Vec<Option<usize>>;
 
 impl RowLabels {
-    /// The names in the first row `line`, and the names of all columns with them: `position[elbow]`. `None` for a table
-    /// without such fields.
+    /// Finds the names in the first row `line`, and returns them with new names for all columns, for example
+    /// `position[elbow]`. `None` for a table without such fields.
     pub(super) fn find(
         header: &[String],
         columns: &[Column],
@@ -50,7 +50,7 @@ impl RowLabels {
         if labels.len() < 2 || !is_distinct {
             return None;
         }
-        // Columns of one quantity by the name without their number.
+        // Columns of one quantity have the same name except for their number.
         let mut quantities: Vec<(String, Vec<Column>)> = Vec::new();
         for column in columns.iter().filter(|column| !fields.contains(&column.field)) {
             let name = &header[column.field];
@@ -77,7 +77,7 @@ impl RowLabels {
         (!quantities.is_empty()).then_some((Self { fields, is_list, texts, labels, quantities }, names))
     }
 
-    /// The order of the names in a row; `None` for that of the first row.
+    /// Order of the names in a row; `None` if it is the order of the first row.
     pub(super) fn order(&self, line: &[u8], row: &[(usize, usize)]) -> Option<Order> {
         let text = |field: &usize| &line[row[*field].0..row[*field].1];
         if self.fields.iter().zip(&self.texts).all(|(field, first)| text(field) == first) {
@@ -91,7 +91,7 @@ impl RowLabels {
         Some(self.labels.iter().map(|label| own.iter().position(|name| name == label)).collect())
     }
 
-    /// The column of a row in this order with the value of `column`; `None` if the row lacks its name.
+    /// Column that contains the value of `column` in a row with this order; `None` if the name is missing in the row.
     pub(super) fn column(&self, column: Column, order: &Order) -> Option<Column> {
         let own = self.quantities.iter().find_map(|columns| {
             let place = columns.iter().position(|known| *known == column)?;
@@ -101,7 +101,7 @@ impl RowLabels {
     }
 }
 
-/// The part of a name after its topic: `position` of `/joint_states.position`.
+/// Last part of a name after its topic: `position` for `/joint_states.position`.
 fn last_word(name: &str) -> &str {
     name.rsplit(['.', '/']).next().unwrap_or(name)
 }
@@ -119,7 +119,7 @@ fn numbered(name: &str) -> Option<(&str, usize)> {
     Some((stem.strip_suffix(['[', '_']).unwrap_or(stem), number))
 }
 
-/// A name in quotes or without; `None` for an empty field or a number.
+/// A name with or without quotes; `None` for an empty field or a number.
 fn label(text: &[u8]) -> Option<String> {
     let text = core::str::from_utf8(text).ok()?.trim().trim_matches(['\'', '"']);
     (!text.is_empty() && number(text.as_bytes(), false).is_none()).then(|| text.to_owned())

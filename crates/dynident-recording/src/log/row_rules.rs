@@ -1,11 +1,11 @@
-//! Rules that leave out rows: by number, by time, by the value of a column.
+//! Rules that exclude rows: by number, by time, by the value of a column.
 
 use super::channels::{ColumnRef, OneOrMany};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
 
-/// A condition on a column of the main file, such as a status: equal to one of several values, above a value, below a
-/// value. All given conditions must hold.
+/// A condition on a column of the main file, for example a status: equal to one of several values, above a value, or
+/// below a value. If several conditions are given, all must be true.
 ///
 /// ```
 /// let rule: dynident_recording::log::RowRule = toml::from_str("column = \"state\"\nequals = [2, 3]").unwrap();
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct RowRule {
     /// Name or 0-based index of a numeric column in the main file.
     pub column: ColumnRef,
-    /// Value, or list of values.
+    /// Value or list of values; the column must equal one of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equals: Option<OneOrMany<f64>>,
     /// Exclusive lower limit.

@@ -1,4 +1,4 @@
-//! The folder of a SAGE recording as one table: measurements, with the commands joined by their time stamps.
+//! The folder of a SAGE recording as one table: measurements, combined with commands by their time stamps.
 
 use super::format::Header;
 use super::source::LogTable;
@@ -12,23 +12,24 @@ use std::path::Path;
 const STAMP: &str = "timestamp";
 
 /// The rows of `state_motor.csv`, each with the last command at or before its time stamp. Rows before the first and
-/// after the last command are left out.
+/// after the last command are omitted.
 ///
 /// Columns are `timestamp` and the entries of all lists: `control.positions[Elbow]`, `state_motor.positions[Elbow]`.
-/// Entries have the names in `joint_list.txt` if it has one for each, otherwise 0-based indices.
+/// Entries have the names in `joint_list.txt` if this file contains a name for each entry; otherwise they have indices
+/// from 0.
 #[derive(Debug)]
 pub(super) struct SageTable {
     names: Vec<String>,
-    /// Table, and its column, of each column: 0 for commands, 1 for measurements.
+    /// For each column, its table (0 for commands, 1 for measurements) and its column there.
     columns: Vec<(usize, usize)>,
     tables: [TextTable; 2],
     stamps: [usize; 2],
     label: String,
-    /// For each selected column: its table, and its place in the rows of the table.
+    /// For each selected column, its table and the index of its value in a row of this table.
     wanted: Vec<(usize, usize)>,
     state: Vec<f64>,
     command_width: usize,
-    /// The command at or before the current stamp, and the next one; each begins with its stamp.
+    /// The command at or before the current time stamp, and the next command; each begins with its stamp.
     command: Option<Vec<f64>>,
     next_command: Option<Vec<f64>>,
     has_begun: bool,
@@ -103,7 +104,7 @@ impl SageTable {
         Ok(())
     }
 
-    /// Moves to the next measurement with a command; false at the end.
+    /// Moves to the next measurement that has a command; returns false at the end.
     fn advance(&mut self) -> Result<bool, RecordingError> {
         if !core::mem::replace(&mut self.has_begun, true) {
             self.advance_command()?;
@@ -118,7 +119,7 @@ impl SageTable {
                 self.advance_command()?;
             }
             match (&self.command, &self.next_command) {
-                // The end of the commands, unless the last one has this stamp.
+                // The commands end here, unless the last one has the time stamp of this measurement.
                 (Some(last), None) if last[0] < stamp => break false,
                 (None, None) => break false,
                 (None, Some(_)) if stamp.is_finite() => {}

@@ -1,31 +1,32 @@
-//! Detects samples that two logs share although their files differ: saved with fewer digits, a part with its time
-//! starting at zero, every second row.
+//! Detection of samples that are contained in two logs although their files differ: values with fewer digits, a part
+//! whose time starts at zero, or every second row.
 //!
-//! Noise makes the values of two runs differ. Rows that agree in every position and torque to within the resolution of
-//! the coarser log, one after the other, are therefore the same samples.
+//! Because of noise, the values of two different runs differ. Therefore, if successive rows of two logs agree in every
+//! position and torque to within the resolution of the coarser log, they are the same samples.
 
 use super::{Log, LogReader, RawBlock};
 use crate::error::RecordingError;
 
 const MAX_ROWS: usize = 400_000;
-/// Number of places in the second log that are searched in the first.
+/// Number of rows of the second log that are searched for in the first log.
 const SEARCHED_PLACES: usize = 12;
-/// Number of successive rows that must agree, and the minimum for short logs.
+/// Number of successive rows that must agree.
 const MATCHED_ROWS: usize = 100;
+/// Minimum number of such rows for short logs.
 const MIN_MATCHED_ROWS: usize = 20;
-/// Tested ratios of the rows of both logs.
+/// Ratios between the sample rates of both logs that are tested.
 const STRIDES: [usize; 5] = [1, 2, 4, 5, 10];
-/// Tolerance in steps of the coarser log: half a step, and a margin for rounded numbers.
+/// Tolerance in resolution steps of the coarser log: half a step, and a margin for rounded numbers.
 const STEP_TOLERANCE: f64 = 0.51;
-/// Tolerance for single precision, as a share of a channel's range.
+/// Tolerance for numbers in single precision, as a share of the channel's range.
 const RANGE_TOLERANCE: f64 = 1e-6;
 
-/// A row in each of two logs from which on both contain the same samples.
+/// A row in each of two logs; from these rows on, both logs contain the same samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharedSamples {
-    /// 0-based data row in the first log's file.
+    /// Data row in the file of the first log, from 0.
     pub row: u64,
-    /// 0-based data row in the other log's file.
+    /// Data row in the file of the other log, from 0.
     pub other_row: u64,
 }
 
@@ -33,7 +34,7 @@ pub struct SharedSamples {
 #[derive(Clone, Debug)]
 pub struct LogSamples {
     row: Vec<u64>,
-    /// Positions, then torques and commands as far as the log has them, of all joints.
+    /// Positions of all joints, then torques and commands if the log has them.
     values: Vec<Vec<f64>>,
     joints: Vec<String>,
 }
@@ -68,13 +69,13 @@ impl LogSamples {
         self.row.len() * self.values.len()
     }
 
-    /// First shared samples of both logs; `None` if there are none or the joints differ. Joints at rest are ignored,
+    /// First samples that both logs contain; `None` if there are none or the joints differ. Joints at rest are ignored,
     /// because a constant position repeats.
     pub fn shared_with(&self, other: &Self) -> Option<SharedSamples> {
         if self.joints != other.joints || self.values.len() != other.values.len() {
             return None;
         }
-        // Places of the shorter log are searched in the longer one.
+        // Rows of the shorter log are searched for in the longer log.
         let [row, other_row] = if self.row.len() < other.row.len() {
             let [other_row, row] = other.rows_shared_with(self)?;
             [row, other_row]
@@ -89,7 +90,7 @@ impl LogSamples {
         let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
         let mut places = (0..SEARCHED_PLACES).map(|place| place * other.row.len() / SEARCHED_PLACES);
         let of_place = |from: usize| {
-            // Start where the robot moves.
+            // The comparison starts where the robot moves.
             let moving =
                 (from..other.row.len().saturating_sub(MIN_MATCHED_ROWS)).find(|&row| other.moves(row, &tolerance))?;
             let agrees = |row: usize, at: usize| {
@@ -120,13 +121,14 @@ impl LogSamples {
     }
 }
 
-/// Maximum difference of the same sample in both logs: half a step of the coarser log.
+/// Maximum difference between values of the same sample in both logs: half a resolution step of the coarser log.
 fn agreement(a: &[f64], b: &[f64]) -> f64 {
     let [low, high] = range(a);
     STEP_TOLERANCE * step(a).max(step(b)) + RANGE_TOLERANCE * (high - low)
 }
 
-/// Minimum step between rows: the resolution of the channel, or less if it has more digits than its noise needs.
+/// Smallest usual step between rows: the resolution of the channel, or less if the channel has more digits than its
+/// noise requires.
 fn step(values: &[f64]) -> f64 {
     let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
     let least = steps.fold(f64::INFINITY, f64::min);

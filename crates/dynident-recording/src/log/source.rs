@@ -8,9 +8,9 @@ use std::path::Path;
 
 /// Source of raw rows: a file of some format, or samples in memory.
 ///
-/// To add a format, implement this trait and [`LogTable`]. Both provide columns of numbers as recorded; a
-/// [`LogFormat`](crate::LogFormat) maps the columns to quantities (unit, sign, gear, range, missing values), and
-/// [`LogReader`](crate::LogReader) applies it.
+/// To add a format, implement this trait and [`LogTable`]. Both provide columns of numbers as recorded. A
+/// [`LogFormat`](crate::LogFormat) maps the columns to quantities (unit, sign, gear ratio, range, missing values), and
+/// [`LogReader`](crate::LogReader) applies this mapping.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogPlace, LogSource, LogTable, MotionBlock, MotionSettings, MotionStream};
@@ -97,11 +97,11 @@ pub trait LogSource: fmt::Debug + Send + Sync {
 /// Columns of a [`LogTable`] that were recorded together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogGroup {
-    /// Name in messages, such as a topic; `None` for a single group.
+    /// Name in messages, for example a topic; `None` if there is only one group.
     pub name: Option<String>,
-    /// Range of its columns.
+    /// Range of the group's columns.
     pub columns: Range<usize>,
-    /// Index of its column of time stamps in seconds, if the format has one.
+    /// Index of the group's column of time stamps in seconds, if the format has one.
     pub time: Option<usize>,
 }
 
@@ -115,8 +115,8 @@ pub trait LogTable: fmt::Debug + Send {
         None
     }
 
-    /// Groups of columns that were recorded together, each with a separate clock. Rows are those of the group of the
-    /// first selected column. Every column belongs to one group.
+    /// Groups of columns that were recorded together, each with its own clock. Every column belongs to one group. The
+    /// rows of a pass are those of the group that contains the first selected column.
     fn groups(&self) -> Vec<LogGroup> {
         vec![LogGroup { name: None, columns: 0..self.width(), time: None }]
     }
@@ -127,39 +127,40 @@ pub trait LogTable: fmt::Debug + Send {
         None
     }
 
-    /// Whether [`all_rows`](Self::all_rows) found text, and no number, in all rows of a column.
+    /// Whether [`all_rows`](Self::all_rows) found text and no numbers in all rows of a column.
     fn is_text(&self, column: usize) -> bool {
         let _ = column;
         false
     }
 
-    /// Contents that are not exposed as columns or numbers, with the reason for each; complete after all rows.
+    /// Contents of the source that are not available as columns or numbers, with the reason for each; complete after
+    /// all rows were read.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Selects the columns, without duplicates, that [`next_row`](Self::next_row) returns in this order. Called before
+    /// Selects the columns (without duplicates) that [`next_row`](Self::next_row) returns, in this order. Called before
     /// the first row.
     fn select(&mut self, fields: &[usize]);
 
-    /// Reads one row: one number for each selected column, NaN or infinite if missing; false at the end.
+    /// Reads one row: one number for each selected column, NaN or infinite if it is missing. Returns false at the end.
     ///
     /// # Errors
     /// If the row does not consist of numbers.
     fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError>;
 
-    /// Skips one row; false at the end.
+    /// Skips one row; returns false at the end.
     ///
     /// # Errors
     /// If it cannot be read.
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
-    /// Reads all remaining rows in their order in the source and passes each to `each` with its group number and the
-    /// columns of the group; text is NaN, see [`is_text`](Self::is_text). Must not follow [`select`](Self::select).
-    /// Override it only for several groups, or for text.
+    /// Reads all remaining rows in their order in the source, and calls `each` with the index of the group and the
+    /// values of the group's columns. Text is NaN; see [`is_text`](Self::is_text). Must not be called after
+    /// [`select`](Self::select). Override this method only for sources with several groups or with text.
     ///
     /// # Errors
-    /// If a row does not consist of numbers; the rows before it were passed on.
+    /// If a row does not consist of numbers; `each` was called for the rows before it.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
         let columns = self.width();
         self.select(&(0..columns).collect::<Vec<_>>());
@@ -170,7 +171,7 @@ pub trait LogTable: fmt::Debug + Send {
         Ok(())
     }
 
-    /// Place of the current row; before the first row, of the column names.
+    /// Place of the current row, for messages; before the first row, the place of the column names.
     fn place(&self) -> LogPlace;
 
     /// Text of a column in the current row; `None` if only the number is available.
@@ -179,7 +180,7 @@ pub trait LogTable: fmt::Debug + Send {
         None
     }
 
-    /// Place of a truncated last row, which is left out.
+    /// Place of a truncated last row, which is omitted.
     fn truncated(&self) -> Option<LogPlace> {
         None
     }

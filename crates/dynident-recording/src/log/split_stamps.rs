@@ -1,27 +1,27 @@
-//! Stamps in two columns, whole seconds and nanoseconds, as ROS writes them: `secs` and `nsecs`, `stamp.sec` and
+//! Time stamps in two columns, whole seconds and nanoseconds, as ROS writes them: `secs` and `nsecs`, `stamp.sec` and
 //! `stamp.nanosec`.
 
 use super::source::{LogGroup, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// Last words of the names of both columns.
+/// Last words of the names of both columns: seconds, and nanoseconds.
 const NAMES: [[&str; 2]; 5] =
     [["secs", "nsecs"], ["sec", "nanosec"], ["sec", "nsec"], ["secs", "nanosecs"], ["seconds", "nanoseconds"]];
 
-/// A table whose columns of whole seconds include their nanoseconds.
+/// A table in which the values of the columns of whole seconds include the nanoseconds.
 #[derive(Debug)]
 pub(super) struct SplitStamps {
     table: Box<dyn LogTable>,
     /// Columns of seconds and of nanoseconds.
     pairs: Vec<[usize; 2]>,
-    /// Index of the nanoseconds of each selected column among the values of `table`.
+    /// For each selected column, the index of its nanoseconds among the values of `table`.
     nanoseconds: Vec<Option<usize>>,
     row: Vec<f64>,
 }
 
 impl SplitStamps {
-    /// `table` itself if it has no such columns.
+    /// Combines both columns; returns `table` itself if it has no such columns.
     pub(super) fn joined(table: Box<dyn LogTable>) -> Box<dyn LogTable> {
         let names = table.names().unwrap_or_default();
         let other = |name: &String| {

@@ -1,17 +1,18 @@
-//! Stamps of a counter that starts again from zero.
+//! Time stamps from a counter that overflows and starts again from zero.
 
-/// Largest step over the start from zero, in units of the step before it.
+/// Maximum step at an overflow of the counter, relative to the step before it.
 const MAX_STEPS: f64 = 10.0;
-/// Numbers of counts after which counters of 16 and 32 bits start again.
+/// Number of counts of 16-bit and 32-bit counters.
 const COUNTS: [f64; 2] = [65_536.0, 4_294_967_296.0];
 /// Length of a day, s.
 const DAY_S: f64 = 86_400.0;
 
-/// Continues the stamps of a counter that overflows, and of the time of day at midnight. A stamp continues the counter
-/// only if this gives a usual step, so that the stamps of a log which was started again remain.
+/// Continues the time stamps of a counter that overflows, and of the time of day at midnight. A stamp is treated as a
+/// continuation only if this gives a step of usual size. Otherwise (for example in a log that was started again) the
+/// stamps are unchanged.
 #[derive(Debug)]
 pub(super) struct ContinuedStamps {
-    /// Spans after which a counter starts again, in units of the stamps.
+    /// Ranges after which a counter starts again, in units of the stamps.
     spans: Vec<f64>,
     last: Option<f64>,
     step: f64,
@@ -19,9 +20,9 @@ pub(super) struct ContinuedStamps {
 }
 
 impl ContinuedStamps {
-    /// For stamps in a unit of this length.
+    /// Creates the continuation for stamps with a unit of this length.
     pub(super) fn new(unit_s: f64) -> Self {
-        // A counter of microseconds that a recorder converts to seconds starts again at 4294.967296.
+        // For example, a counter of microseconds that a recorder converts to seconds starts again at 4294.967296.
         let converted = [1e-3, 1e-6, 1e-9].map(|tick_s| COUNTS[1] * tick_s / unit_s);
         Self { spans: [&COUNTS[..], &converted, &[DAY_S / unit_s]].concat(), last: None, step: 0.0, added: 0.0 }
     }
@@ -44,7 +45,7 @@ impl ContinuedStamps {
         self.continued(stamp)
     }
 
-    /// A stamp of the current span on the continued time axis.
+    /// A stamp within the present range of the counter, on the continued time axis.
     pub(super) fn continued(&self, stamp: f64) -> f64 {
         stamp + self.added
     }

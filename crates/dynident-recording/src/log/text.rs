@@ -1,4 +1,4 @@
-//! Reads text tables (CSV and similar): detects delimiter, header and a row of units, parses rows of numbers.
+//! Reading of text tables (CSV and similar): detects delimiter, header and a row of units, and parses rows of numbers.
 
 use super::columns::column_label;
 use super::field::number;
@@ -13,7 +13,7 @@ use crate::place::LogPlace;
 use std::io::Read;
 use std::path::Path;
 
-/// Fields of a column without a number, in a pass over all rows.
+/// Number of fields of a column that contain no number, found in a pass over all rows.
 #[derive(Clone, Debug)]
 struct TextFields {
     count: u64,
@@ -27,16 +27,16 @@ pub(super) struct TextTable {
     lines: Lines,
     delimiter: u8,
     header_line: u64,
-    /// The line of the names, which a recorder that is started again repeats.
+    /// The line with the names. A recorder that is started again repeats it.
     header: Option<Vec<u8>>,
     repeated_headers: u64,
     names: Option<Vec<String>>,
-    /// Fields of the row below the header, if it contains units.
+    /// Fields of the row below the header, if this row contains units.
     units: Option<Vec<String>>,
     columns: Vec<Column>,
     /// Names of joints in text fields.
     labels: Option<RowLabels>,
-    /// Number of fields of a row.
+    /// Number of fields in a row.
     field_count: usize,
     first_row_is_pending: bool,
     wanted: Vec<Column>,
@@ -137,7 +137,7 @@ impl TextTable {
         self.rows
     }
 
-    /// Moves to the next row, beyond copies of the header line.
+    /// Moves to the next row and skips copies of the header line.
     fn advance(&mut self) -> Result<bool, RecordingError> {
         if core::mem::take(&mut self.first_row_is_pending) {
             return Ok(true);
@@ -191,7 +191,8 @@ impl TextTable {
 }
 
 impl TextTable {
-    /// Reads the next row, with NaN for an empty field; `unread` gets a field without a number and decides about it.
+    /// Reads the next row, with NaN for an empty field. `unread` is called for each field without a number and decides
+    /// whether this is an error.
     fn read_row(
         &mut self,
         values: &mut [f64],
@@ -298,7 +299,8 @@ impl LogTable for TextTable {
         self.read_row(values, |table, place| Err(table.not_a_number(table.wanted[place])))
     }
 
-    /// Fields without a number are NaN, because nobody asked for their column; [`notes`](Self::notes) names them.
+    /// Reads all rows. Fields without a number are NaN and not an error, because no study key requested their column;
+    /// [`notes`](Self::notes) lists them.
     fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
         let columns: Vec<usize> = (0..self.columns.len()).collect();
         self.select(&columns);

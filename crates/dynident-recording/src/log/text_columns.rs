@@ -1,10 +1,10 @@
-//! Fields of a line of a text table, and the columns in them.
+//! Division of a line of a text table into fields, and of fields into columns.
 
 use super::field::{entry, list_length, number};
 
-/// Maximum number of entries of a list that become columns.
+/// Maximum number of entries of a list in a field that become columns.
 const MAX_ENTRIES: usize = 1024;
-/// Fields, in any case and with or without brackets, of a row of units.
+/// Texts that identify a row of units, in upper or lower case and with or without brackets.
 const UNITS: [&str; 20] = [
     "s", "sec", "seconds", "ms", "us", "ns", "rad", "deg", "degrees", "rad/s", "deg/s", "rpm", "m", "mm", "nm", "n m",
     "n", "a", "ma", "v",
@@ -19,7 +19,7 @@ pub(super) struct Column {
 }
 
 pub(super) fn guessed_delimiter(line: &[u8]) -> u8 {
-    // Tabs and semicolons first, because their files may have decimal commas.
+    // Tabs and semicolons are tried first, because files with these separators may have decimal commas.
     for delimiter in *b"\t;," {
         if line.contains(&delimiter) {
             return delimiter;
@@ -28,7 +28,7 @@ pub(super) fn guessed_delimiter(line: &[u8]) -> u8 {
     b' '
 }
 
-/// Splits `line` into trimmed, unquoted fields, as byte ranges.
+/// Splits `line` into fields without outer blanks and quotes, as byte ranges.
 pub(super) fn split(line: &[u8], delimiter: u8, fields: &mut Vec<(usize, usize)>) {
     fields.clear();
     if delimiter == b' ' {
@@ -82,7 +82,7 @@ impl Column {
     }
 }
 
-/// The columns of a table with this first row: one for each field, or one for each entry of a list in it.
+/// Columns of a table with this first row: one for each field, or one for each entry if a field contains a list.
 pub(super) fn columns(line: &[u8], row: &[(usize, usize)], fields: usize) -> Vec<Column> {
     let of_field = |field: usize| {
         let list = row.get(field).and_then(|(from, to)| list_length(&line[*from..*to]));
@@ -92,7 +92,7 @@ pub(super) fn columns(line: &[u8], row: &[(usize, usize)], fields: usize) -> Vec
     (0..fields).flat_map(of_field).collect()
 }
 
-/// Whether most fields of a row name units, and none is a number.
+/// Whether most fields of a row are names of units, and no field is a number.
 pub(super) fn are_units(line: &[u8], row: &[(usize, usize)]) -> bool {
     let fields = || row.iter().map(|(from, to)| &line[*from..*to]).filter(|field| !field.is_empty());
     let is_unit = |field: &[u8]| UNITS.iter().any(|unit| bare(field).eq_ignore_ascii_case(unit.as_bytes()));
@@ -100,7 +100,8 @@ pub(super) fn are_units(line: &[u8], row: &[(usize, usize)]) -> bool {
     2 * units > fields().count() && fields().all(|field| number(field, true).is_none() && list_length(field).is_none())
 }
 
-/// Whether the row below `names` completes them, because they repeat: quantities above the joints, as in pandas.
+/// Whether the row below `names` also contains names. This is the case if `names` repeat: quantities are written above
+/// the joints, as in pandas.
 pub(super) fn are_second_names(names: &[String], line: &[u8], row: &[(usize, usize)]) -> bool {
     let is_repeated = (1..names.len()).any(|at| !names[at].is_empty() && names[..at].contains(&names[at]));
     let mut fields = row.iter().map(|(from, to)| &line[*from..*to]);

@@ -14,7 +14,7 @@ pub enum Quantity {
     Velocity,
     /// Acceleration (rad/s², m/s²).
     Acceleration,
-    /// Torque or force (N m, N), or a current that `scale` converts.
+    /// Torque or force (N m, N), or a current that `scale` converts to a torque.
     Torque,
     /// Temperature, °C.
     Temperature,
@@ -27,7 +27,7 @@ impl Quantity {
     pub(crate) const ALL: [Self; 6] =
         [Self::Position, Self::Velocity, Self::Acceleration, Self::Torque, Self::Temperature, Self::Command];
 
-    /// Key of its channel group in a [`LogFormat`](crate::LogFormat), also used in reports.
+    /// Key of the quantity's channel group in a [`LogFormat`](crate::LogFormat); also its name in reports.
     pub fn key(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -40,12 +40,12 @@ impl Quantity {
     }
 }
 
-/// The quantity with the same units: a commanded position has those of a position.
+/// The quantity that has the same units: a commanded position has the units of a position.
 fn dimension(quantity: Quantity) -> Quantity {
     if quantity == Quantity::Command { Quantity::Position } else { quantity }
 }
 
-/// Name, quantity, factor to SI.
+/// Units with name, quantity and factor to SI units.
 const UNITS: &[(&str, Quantity, f64)] = &[
     ("rad", Quantity::Position, 1.0),
     ("mrad", Quantity::Position, 1e-3),

@@ -16,20 +16,20 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSettings {
-    /// Differentiator from q to dq and ddq.
+    /// Differentiator, which computes velocity and acceleration from the positions.
     pub differentiator: DifferentiatorSettings,
     /// Whether to smooth the torque like the positions, as [`MotionBlock::tau_smooth`].
     pub smooth_torque: bool,
-    /// Time left out at both ends of every uninterrupted piece, where a zero-phase filter extrapolates, s; 0 to
+    /// Time that is omitted at both ends of every uninterrupted piece, where a zero-phase filter extrapolates, s; 0 to
     /// 1,000,000, 0 by default.
     pub trim_s: f64,
-    /// Whether to keep all samples as logged. By default single torque samples far from their neighbours and torque
-    /// that is repeated while its joint moves are ignored, and single spikes of a position are replaced; see
-    /// [`RejectedSamples`](crate::RejectedSamples).
+    /// Whether to keep all samples as logged. By default, two kinds of torque samples are ignored (single samples far
+    /// from their neighbours, and values that are repeated while their joint moves), and single spikes of a position
+    /// are replaced; see [`RejectedSamples`](crate::RejectedSamples).
     pub keep_outliers: bool,
-    /// Delay of the torque relative to the motion, s, one value for all joints or one for each; the torque is shifted
-    /// by it. Negative if the torque is early. `identify` allows 2.5 times the time scale of the robot (2.5 s for an
-    /// arm of 1.2 m). Without a value the torque is not shifted here, and `identify` estimates the delay.
+    /// Time by which the torque is later than the motion, s: one value for all joints or one for each. The torque is
+    /// shifted by it. Negative if the torque is early. `identify` permits 2.5 times the time scale of the robot (2.5 s
+    /// for an arm of 1.2 m). If it is not given, the torque is not shifted here, and `identify` estimates the lag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_lag_s: Option<OneOrMany<f64>>,
     /// Limits of the decisions on samples, clock and cut-off; not part of a study file.
@@ -37,20 +37,20 @@ pub struct MotionSettings {
     pub limits: ImportLimits,
 }
 
-/// Limits of the decisions that are made while a log is read.
+/// Limits of the decisions that Dynident makes while it reads a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportLimits {
-    /// Detection of invalid samples.
+    /// Limits of the detection of invalid samples.
     pub cleaning: CleaningSettings,
-    /// Times of the samples.
+    /// Limits of the decision on the times of samples.
     pub clock: ClockSettings,
-    /// Cut-off.
+    /// Limits of the selection of a cut-off.
     pub cutoff: CutoffSettings,
-    /// Findings in the report.
+    /// Limits of the findings in the report.
     pub report: ReportSettings,
 }
 
-/// Maximum delay for any robot, s.
+/// Maximum lag for any robot, s.
 const MAX_LAG_S: f64 = 1e4;
 
 impl MotionSettings {
@@ -71,7 +71,7 @@ impl MotionSettings {
         self.differentiator.validate()
     }
 
-    /// The delays of the joints, s; empty if not set.
+    /// The torque lags of the joints, s; empty if not set.
     ///
     /// # Errors
     /// If the list has another length.
@@ -85,24 +85,24 @@ impl MotionSettings {
     }
 }
 
-/// Length of the ends of a piece that depend on extrapolated samples, in periods of the cut-off: there the transients
-/// of a Butterworth filter of order 4 have decayed to 3 %.
+/// Length of the part of a piece at each end that depends on extrapolated samples, in periods of the cut-off. After
+/// this time, the transients of a Butterworth filter of order 4 have decayed to 3 %.
 const UNSETTLED_PERIODS: f64 = 1.5;
 
-/// Number of samples at each end of a long piece whose motion a low-pass at `cutoff_hz` takes from extrapolated
-/// samples.
+/// Number of samples at each end of a long piece whose motion depends on samples that a low-pass with this cut-off
+/// extrapolates.
 pub fn unsettled_samples(rate_hz: f64, cutoff_hz: f64) -> usize {
     (UNSETTLED_PERIODS * rate_hz / cutoff_hz) as usize
 }
 
-/// Successive samples of a motion on a uniform clock, joint-major: entry `joint * rows + row`.
+/// Successive samples of a motion on a uniform clock, joint after joint: the value at `joint * rows + row`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionBlock {
     /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// Number of the uninterrupted piece; blocks of different pieces must not be filtered together.
+    /// Index of the uninterrupted piece. Blocks of different pieces must not be filtered together.
     pub segment: usize,
-    /// Time of the first row, in seconds after the first data row of the file.
+    /// Time of the first row, s after the first data row of the file.
     pub first_time_s: f64,
     /// Number of rows.
     pub rows: usize,
@@ -120,11 +120,12 @@ pub struct MotionBlock {
     pub tau_smooth: Vec<f64>,
     /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
     pub temperature_c: Vec<f64>,
-    /// Whether a sample's torque is ignored (outlier, held, filled hole), with the layout of the torques; empty if all
-    /// are valid. Its value is replaced by a straight line; a fit leaves the sample out of torque and regressor.
+    /// For each torque value, whether it is ignored (outlier, held value, filled hole); empty if all are valid. An
+    /// ignored value is replaced by a straight line, and a fit excludes the sample from torque and regressor.
     pub set_aside: Vec<bool>,
-    /// Number of rows at the start and at the end whose motion depends on samples that the filter extrapolated at the
-    /// ends of a piece: 1.5 periods of the cut-off, at most the filter's length and a quarter of the piece.
+    /// Number of rows at the start and at the end of the block whose motion depends on samples that the filter
+    /// extrapolated at the ends of a piece: 1.5 periods of the cut-off, at most the length of the filter and a quarter
+    /// of the piece.
     pub unsettled: [usize; 2],
 }
 
@@ -139,9 +140,9 @@ impl MotionBlock {
         &values[joint * self.rows..(joint + 1) * self.rows]
     }
 
-    /// Shifts the torque of each joint by its delay `lag_s` (s, one value for all joints or one for each; missing
-    /// values are zero), as [`MotionSettings::torque_lag_s`] does while reading a log. Samples without a torque after
-    /// the shift are marked in `set_aside`.
+    /// Shifts the torque of each joint by its lag `lag_s` (s, one value for all joints or one for each; missing values
+    /// are zero), as [`MotionSettings::torque_lag_s`] does while a log is read. Samples that have no torque after the
+    /// shift are marked in `set_aside`.
     #[must_use]
     pub fn without_torque_lag(&self, lag_s: &OneOrMany<f64>) -> Self {
         let lags = (0..self.joints).map(|joint| lag_s.at(joint).unwrap_or(0.0));
@@ -162,7 +163,7 @@ impl MotionBlock {
         shifted
     }
 
-    /// The rows `run` of the block.
+    /// The rows in the range `run` of the block.
     ///
     /// # Panics
     /// If the block has fewer rows.

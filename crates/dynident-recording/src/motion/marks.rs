@@ -1,8 +1,8 @@
-//! Selects the samples of a block that are kept.
+//! Selection of the samples of a block that are kept.
 
 use core::ops::Range;
 
-/// The runs of rows of a block without a mark. Marks (in any order, possibly overlapping) are indices in a window;
+/// Ranges of rows of a block without a mark. Marks are index ranges in a window, in any order and possibly overlapping;
 /// sample `first` of the window is the first row of the block.
 pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = marked

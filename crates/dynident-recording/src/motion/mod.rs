@@ -1,7 +1,7 @@
-//! Converts a log to q, dq, ddq and torque on a uniform clock, block by block.
+//! Conversion of a log to positions q, velocities dq, accelerations ddq and torque on a uniform clock, block by block.
 //!
-//! [`MotionStream`] combines reader, clock, differentiator and checks, and returns [`MotionBlock`]s; [`MotionSettings`]
-//! configures it.
+//! [`MotionStream`] combines reader, clock, differentiator and checks, and returns [`MotionBlock`]s. [`MotionSettings`]
+//! contains its settings.
 
 mod block;
 mod marks;

@@ -21,12 +21,12 @@ pub(super) struct Opening {
     /// Quantisation steps of positions and torques, joint by joint.
     pub(super) position_steps: Vec<Option<f64>>,
     pub(super) torque_steps: Vec<Option<f64>>,
-    /// Number of rows per new position and per new torque, if a recorder repeats them.
+    /// Number of rows per new position, and per new torque, if a recorder repeats values.
     pub(super) rows_to_a_value: [Option<u64>; 2],
 }
 
 impl Opening {
-    /// Estimates for `log`; its first rows are read once for all passes.
+    /// Estimates these properties for `log`; its first rows are read only once for all passes.
     ///
     /// # Errors
     /// If the log has no torque, the rows cannot be read, or they do not determine a rate.

@@ -1,4 +1,4 @@
-//! Converts a log file to q, dq, ddq and torque on a uniform clock, block by block.
+//! Conversion of a log to positions q, velocities dq, accelerations ddq and torque on a uniform clock, block by block.
 
 mod giving;
 
@@ -22,17 +22,17 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Minimum number of rows of a [`MotionBlock`], except the last of a segment.
+/// Minimum number of rows in a [`MotionBlock`], except the last one of a segment.
 const MIN_CHUNK_ROWS: usize = 8192;
-/// Number of rows per backward step below which a log without an uninterrupted piece is reported as not ordered by
-/// time.
+/// If a log has no uninterrupted piece and fewer rows than this number per backward step, it is reported as not ordered
+/// by time.
 const MIN_ROWS_PER_BACKWARD_STEP: u64 = 10;
 
-/// Conversion of a log to a motion. Memory does not grow with the log's length, unless the differentiator needs the
+/// Converts a log to a motion. The memory does not grow with the length of the log, unless the differentiator needs the
 /// whole log.
 ///
-/// Opening reads a limited first part of the log to determine clock, rate and cut-off, once for all passes over a
-/// [`Log`] and its clones. [`next_block`](Self::next_block) then reads the log from the start.
+/// When the stream is opened, a limited first part of the log is read to determine clock, rate and cut-off, once for
+/// all passes over a [`Log`] and its clones. [`next_block`](Self::next_block) then reads the log from its start.
 #[derive(Debug)]
 pub struct MotionStream {
     rows_in: CleanRows,
@@ -47,16 +47,16 @@ pub struct MotionStream {
     smooth_torque: bool,
     torque_shift: TorqueShift,
     trim: usize,
-    /// Samples at the ends of a piece that depend on extrapolated samples.
+    /// Number of samples at the ends of a piece whose motion depends on extrapolated samples.
     unsettled: usize,
-    /// Samples needed on either side of a chunk; `None`: the whole segment.
+    /// Number of samples that are needed on either side of a block; `None` for the whole segment.
     context: Option<usize>,
     segmenter: Segmenter,
     /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations, temperatures.
     uniform: Vec<Vec<f64>>,
-    /// Number of samples in `uniform` that were returned and remain as context.
+    /// Number of samples in `uniform` that were already returned and are kept because the next block needs them.
     done: usize,
-    /// Number of samples of the segment before those in `uniform`.
+    /// Number of samples of the segment that are no longer in `uniform`.
     passed: u64,
     /// Samples of the segment whose torque is ignored: index in the segment and joint, ascending.
     set_aside: VecDeque<(u64, usize)>,
@@ -67,7 +67,7 @@ pub struct MotionStream {
     short_segments: [u64; 2],
     longest_short: usize,
     rows: u64,
-    /// For positions and for torques.
+    /// Number of rows per new value, for positions and for torques.
     rows_to_a_value: [Option<u64>; 2],
     time_check: TimeCheck,
     report_limits: ReportSettings,
@@ -75,9 +75,9 @@ pub struct MotionStream {
     velocity: Vec<Comparison>,
     acceleration: Vec<Comparison>,
     window: [Vec<f64>; 4],
-    /// Blocks between samples that were left out.
+    /// Blocks between omitted samples that were not returned yet.
     waiting: VecDeque<MotionBlock>,
-    /// Number of cuts where the differentiator does not apply, and whether the last sample was left out.
+    /// Number of cuts where the differentiator is not valid; `in_cut` states whether the last sample was omitted.
     cuts: usize,
     in_cut: bool,
     unmapped: u64,
@@ -85,7 +85,7 @@ pub struct MotionStream {
 }
 
 impl MotionStream {
-    /// Starts a pass over the log with the main file `file`: [`new`](Self::new) of [`Log::file`].
+    /// Starts a pass over the log with the main file `file`, as [`new`](Self::new) for [`Log::file`].
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -106,11 +106,11 @@ impl MotionStream {
         Self::following(log, settings, None)
     }
 
-    /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it, its joints in the order of
-    /// the log.
+    /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it. The joints of `reference`
+    /// are in the order of the log.
     ///
-    /// Where the differentiator does not apply to a joint, the samples of all joints are left out and the piece is cut;
-    /// the report contains their number.
+    /// If the differentiator is not valid for a joint at some samples, these samples are omitted for all joints and the
+    /// piece is divided; the report contains their number.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -123,7 +123,7 @@ impl MotionStream {
         Self::begin(log, settings, |cutoff| settings.differentiator.build_following(cutoff.cutoff_hz, reference))
     }
 
-    /// As [`new`](Self::new), with a differentiator of the caller instead of that in the settings.
+    /// As [`new`](Self::new), with a differentiator of the caller instead of the one in the settings.
     ///
     /// `build` gets the cut-off that is estimated from the data.
     ///
@@ -187,7 +187,7 @@ impl MotionStream {
             cutoff_in_use_hz,
             time_check: TimeCheck::new(clock.median_step_s),
             position_noise: opening.noise.beyond(cutoff_in_use_hz),
-            // Copied rows are left out, so the remaining rows do not repeat values.
+            // Copied rows are omitted, so the remaining rows do not repeat values.
             rows_to_a_value: if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value },
             clock,
             cutoff,
@@ -217,7 +217,7 @@ impl MotionStream {
         })
     }
 
-    /// Reads rows ahead in a separate thread; the result is bit-identical.
+    /// Reads rows ahead in a separate thread. The result is bit-identical.
     #[must_use]
     pub fn read_beside(self) -> Self {
         Self { rows_in: self.rows_in.read_in_thread(), ..self }
@@ -239,13 +239,13 @@ impl MotionStream {
         &self.cutoff
     }
 
-    /// Standard deviation of the white position noise per sample, for each joint: see
+    /// Standard deviation of the white position noise in one sample, for each joint: see
     /// [`position_noise()`](crate::position_noise()).
     pub fn position_noise(&self) -> &[f64] {
         &self.position_noise
     }
 
-    /// Fills `block` with the next samples; false (and an empty block) at the end.
+    /// Writes the next samples to `block`; returns false (and an empty block) at the end.
     ///
     /// # Errors
     /// If the log cannot be read further, or no piece of it is long enough for the filter.
@@ -313,7 +313,7 @@ impl MotionStream {
         MIN_CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
     }
 
-    /// Moves raw rows to the uniform clock until the raw block or the segment ends.
+    /// Moves raw rows to the uniform clock, until the raw block or the segment ends.
     fn feed(&mut self) -> Result<(), RecordingError> {
         if self.clean_at >= self.clean.raw.rows() {
             self.clean_at = 0;

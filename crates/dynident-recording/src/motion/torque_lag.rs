@@ -1,12 +1,12 @@
-//! Compensates the delay of the torque relative to the motion.
+//! Compensation of the lag of the torque behind the motion.
 
 use core::ops::Range;
 
-/// Number of samples for the interpolation of torque: the polynomial of degree five has an error below 1e-3 for a
+/// Number of samples for the interpolation of the torque. The polynomial of degree five has an error below 1e-3 for a
 /// sinusoid of a tenth of the sampling rate.
 const NODES: usize = 6;
 
-/// Torque delay of each joint in samples: `τ(t_k)` is taken from the log at `t_k + lag`.
+/// Torque lag of each joint in samples: `τ(t_k)` is the logged torque at `t_k + lag`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TorqueShift {
     samples: Vec<f64>,
@@ -14,12 +14,12 @@ pub(crate) struct TorqueShift {
 
 impl TorqueShift {
     pub(crate) fn new(lag_s: impl Iterator<Item = f64>, rate_hz: f64) -> Self {
-        // Less than 1e-9 samples is a rounding error of the setting.
+        // A lag below 1e-9 samples is a rounding error of the setting.
         let samples = lag_s.map(|lag_s| lag_s * rate_hz).map(|shift| if shift.abs() < 1e-9 { 0.0 } else { shift });
         Self { samples: samples.collect() }
     }
 
-    /// Maximum distance of the samples that determine a row's torque.
+    /// Maximum distance of the samples from which the torque of a row is computed.
     pub(crate) fn reach(&self) -> usize {
         let longest = self.samples.iter().fold(0.0_f64, |longest, shift| longest.max(shift.abs()));
         if longest > 0.0 { longest.ceil() as usize + NODES / 2 } else { 0 }
@@ -30,18 +30,18 @@ impl TorqueShift {
         self.samples.get(joint).copied().unwrap_or(0.0)
     }
 
-    /// The rows affected by a mark on the torque at `place` of a piece: the two adjacent rows, or the row at this
-    /// place.
+    /// Rows that are affected if the torque at `place` of a piece is marked as invalid: the two adjacent rows, or the
+    /// row at this place.
     pub(crate) fn rows_of_mark(&self, joint: usize, place: f64) -> impl Iterator<Item = u64> + use<> {
         let place = place - self.of(joint);
-        // A sample on the grid is copied, one between grid points contributes to both.
+        // A sample on the grid is copied. A sample between grid points contributes to both of them.
         let on_grid = (place - place.round()).abs() <= 1e-6;
         let rows = if on_grid { [place.round(), place.round()] } else { [place.floor(), place.ceil()] };
         rows.into_iter().filter(|row| *row >= 0.0).map(|row| row as u64)
     }
 
-    /// Appends the shifted torques of `rows` of a joint's `signal`. Returns the indices of rows outside the signal;
-    /// they get its first or last value.
+    /// Appends the shifted torques for the rows `rows` of a joint's `signal`. Returns the indices of rows outside of
+    /// the signal; they get its first or last value.
     pub(crate) fn append(&self, joint: usize, signal: &[f64], rows: Range<usize>, out: &mut Vec<f64>) -> Vec<usize> {
         let shift = self.of(joint);
         if shift == 0.0 {
@@ -74,7 +74,7 @@ impl TorqueShift {
     }
 }
 
-/// Weights of the nodes -2 .. 3 for the value at `x`, 0 to 1.
+/// Weights of the nodes -2 .. 3 for the value at `x` (0 to 1).
 fn lagrange(x: f64) -> [f64; NODES] {
     let node = |k: usize| k as f64 - (NODES / 2 - 1) as f64;
     core::array::from_fn(|i| {

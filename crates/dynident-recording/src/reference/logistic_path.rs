@@ -1,16 +1,16 @@
-//! The paper's spliced logistic function, a path on which the position determines velocity and acceleration.
+//! Spliced logistic function: a path on which the position determines velocity and acceleration.
 
 use super::stroke::{Stroke, share_rests};
 use crate::error::FilterError;
 use serde::{Deserialize, Serialize};
 
-/// The spliced logistic function of one joint, there and back:
+/// The spliced logistic function of one joint, a motion there and back:
 ///
 /// `q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4))` in the first half of each period, `h + A/(1 + e^(ω rem(t, T) - 3ωT/4))`
 /// in the second;
 ///
-/// After the last period the joint is at its initial position. A joint with A = 0 does not move.
-/// Source: the paper's Eqs. 12 to 14.
+/// After the last period the joint is at its initial position. A joint with A = 0 does not move. Source: *Iterative
+/// Identification of Robot Dynamic Parameters Based on Logistic Function*, Eqs. 12 to 14.
 ///
 /// ```
 /// let path: dynident_recording::LogisticPath =
@@ -65,7 +65,8 @@ impl LogisticPath {
         Ok(())
     }
 
-    /// q, dq and ddq at a time after the start, s; at rest before the start and after the last period.
+    /// Position q, velocity dq and acceleration ddq at a time after the start, s. The joint is at rest before the start
+    /// and after the last period.
     pub fn at(&self, time_s: f64) -> [f64; 3] {
         let end = f64::from(self.repetitions) * self.period_s;
         if !(time_s >= 0.0 && time_s < end) {
@@ -80,7 +81,7 @@ impl LogisticPath {
         }
     }
 
-    /// q, dq, ddq from the argument of the logistic function and the direction.
+    /// Position q, velocity dq and acceleration ddq for an argument of the logistic function and a direction.
     fn on(&self, argument: f64, sign: f64) -> [f64; 3] {
         let e = (-argument.abs()).exp();
         let d = 1.0 / (1.0 + e);
@@ -93,9 +94,10 @@ impl LogisticPath {
         ]
     }
 
-    /// Velocity and acceleration from the position, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, positive for
-    /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas have the
-    /// wrong sign.
+    /// Velocity and acceleration from the position (Eqs. 15 and 16 of the same source):
+    /// `dq = ±(ω/A)(q - h)(A - q + h)`, with the positive sign if `there` is true,
+    /// `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` for positions outside the stroke, for which the formulas
+    /// have the wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
         let Self { amplitude, omega, offset, .. } = *self;
         let (gone, left) = (q - offset, amplitude - (q - offset));
@@ -108,7 +110,7 @@ impl LogisticPath {
         Some([if there { dq } else { -dq }, ddq])
     }
 
-    /// Whether the joint moves there (not back) at a time: the branch of Eq. 15.
+    /// Whether the joint moves there (not back) at a time, which determines the sign in Eq. 15.
     pub fn goes_there(&self, time_s: f64) -> bool {
         time_s.rem_euclid(self.period_s) < 0.5 * self.period_s
     }
@@ -119,8 +121,8 @@ impl LogisticPath {
         [0.25 * size, size * self.omega / (6.0 * 3.0_f64.sqrt())]
     }
 
-    /// Two strokes per period; empty if A = 0. They cover the times with a velocity above 1e-3 of its peak: up to
-    /// ln(4000)/ω from the middle.
+    /// Two strokes per period; empty if A = 0. A stroke contains the times at which the velocity is above 1e-3 of its
+    /// peak: up to ln(4000)/ω from its middle.
     pub(crate) fn strokes(&self) -> Vec<Stroke> {
         if self.amplitude == 0.0 {
             return Vec::new();

@@ -1,7 +1,8 @@
 //! The commanded motion, for differentiators that need it.
 //!
-//! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It contains its
-//! [`Stroke`]s, the pieces between rests. [`ReferenceSettings`] is its form in a study file.
+//! [`Reference`] gives the commanded motion at any time, from samples or from the closed form of [`LogisticPath`]s. It
+//! also contains its [`Stroke`]s, the parts of the motion between rests. [`ReferenceSettings`] contains its settings in
+//! a study file.
 
 mod logistic_path;
 mod settings;
@@ -19,11 +20,11 @@ use std::path::Path;
 use stroke::{between, share_rests, strokes_of};
 
 const MAX_SAMPLES: usize = 10_000_000;
-/// Maximum velocity and acceleration of a joint at rest, as shares of their peaks.
+/// Maximum velocity and maximum acceleration of a joint at rest, as shares of their peaks.
 const MAX_REST_SHARES: [f64; 2] = [1e-3, 1e-2];
 
-/// Position, velocity and acceleration of every joint as commanded, at any time: from samples (the `trajectory.csv` of
-/// `design`), or from the closed form of the paper's logistic strokes.
+/// Commanded position, velocity and acceleration of every joint at any time: from samples (the `trajectory.csv` of
+/// `design`), or from the closed form of logistic strokes ([`LogisticPath`]).
 #[derive(Clone, Debug)]
 pub struct Reference {
     joints: Vec<JointReference>,
@@ -44,20 +45,22 @@ enum JointPath {
     Logistic(LogisticPath),
 }
 
-/// Samples of one joint, interpolated by the quintic through position, velocity and acceleration at both ends.
+/// Samples of one joint, interpolated by the quintic polynomial with the position, velocity and acceleration of both
+/// neighbouring samples.
 #[derive(Clone, Debug)]
 struct ReferenceTable {
     times_s: std::sync::Arc<[f64]>,
-    /// q, dq, ddq.
+    /// Position q, velocity dq and acceleration ddq of each sample.
     values: Vec<[f64; 3]>,
 }
 
 impl Reference {
-    /// From samples: `joints[j]` contains q, dq and ddq of joint j at the increasing times `times_s` (rad, rad/s,
-    /// rad/s²; m for prismatic joints).
+    /// Creates a commanded motion from samples: `joints[j]` contains position q, velocity dq and acceleration ddq of
+    /// joint j at the increasing times `times_s` (rad, rad/s, rad/s²; m for prismatic joints).
     ///
-    /// Interpolation by the quintic through q, dq and ddq at both ends: for a smooth motion the error is `h⁶/46080` of
-    /// its sixth derivative. Before the first and after the last sample the joint is at rest.
+    /// Between samples, a quintic polynomial with the q, dq and ddq of both neighbouring samples is used. For a smooth
+    /// motion with the step h, its error is `h⁶/46080` times the sixth derivative. Before the first and after the last
+    /// sample the joint is at rest.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for fewer than two samples, lists of unequal length, times that do not increase, or
@@ -100,7 +103,7 @@ impl Reference {
         Ok(Self { joints, start_s: 0.0 })
     }
 
-    /// From the paper's spliced logistic functions, one for each joint.
+    /// Creates a commanded motion from spliced logistic functions, one for each joint.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for an invalid path ([`LogisticPath::validate`]).
@@ -116,8 +119,8 @@ impl Reference {
         Ok(Self { joints, start_s: 0.0 })
     }
 
-    /// Reads a table in the format of `design`: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, with numbers from 1 to
-    /// `joints`, SI units. Time is relative to its first row.
+    /// Reads a table in the format that `design` writes: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, with numbers from 1
+    /// to `joints`, SI units. Time is relative to its first row.
     ///
     /// # Errors
     /// As [`LogReader`], and as [`sampled`](Self::sampled).
@@ -133,7 +136,7 @@ impl Reference {
             clock: ClockRule::Stamps,
             max_gap_steps: 1000.0,
             bridge_gaps: false,
-            // A log needs a torque; use the positions, because a reference has no torque.
+            // A log needs a torque. The positions are used as torque, because a reference has none.
             ..LogFormat::with_time(time, columns("q"), columns("q"))
         };
         let names: Vec<String> = (1..=joints).map(|j| format!("joint {j}")).collect();
@@ -157,15 +160,15 @@ impl Reference {
         })
     }
 
-    /// Sets the start of the motion, s after the log's first row.
+    /// Sets the start of the motion, s after the first row of the log.
     #[must_use]
     pub fn starting_at(mut self, start_s: f64) -> Self {
         self.start_s = start_s;
         self
     }
 
-    /// Replaces the strokes by those between successive `boundaries_s` (s after the start of the motion), for motions
-    /// that turn without resting. Joints that never move have no strokes.
+    /// Defines the strokes by successive times `boundaries_s` (s after the start of the motion), for motions that
+    /// reverse without a rest. Joints that never move have no strokes.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for fewer than two boundaries, or boundaries that are not finite or do not increase.
@@ -196,7 +199,7 @@ impl Reference {
         self.joints.len()
     }
 
-    /// Period of a repeated motion, s: the length of its table, or the period of all closed forms; `None` if their
+    /// Period of a repeated motion, s: the duration of the table, or the period of all closed forms; `None` if their
     /// periods differ.
     pub fn period_s(&self) -> Option<f64> {
         let period = |joint: &JointReference| match &joint.path {
@@ -207,12 +210,12 @@ impl Reference {
         self.joints.iter().all(|joint| period(joint) == first).then_some(first)
     }
 
-    /// Start of the motion, s after the log's first row.
+    /// Start of the motion, s after the first row of the log.
     pub fn start_s(&self) -> f64 {
         self.start_s
     }
 
-    /// q, dq and ddq of a joint at a time in s after the log's first row.
+    /// Position q, velocity dq and acceleration ddq of a joint at a time, s after the first row of the log.
     ///
     /// # Panics
     /// If the joint does not exist.
@@ -232,8 +235,8 @@ impl Reference {
         rests(&self.at(joint, time_s), self.joints[joint].peak)
     }
 
-    /// The strokes of the joint from rest to rest, in s after the log's first row. A joint that never rests has one
-    /// stroke; a joint that never moves has none.
+    /// The strokes of the joint from rest to rest; times in s after the first row of the log. A joint that never rests
+    /// has one stroke; a joint that never moves has none.
     ///
     /// # Panics
     /// If the joint does not exist.
@@ -247,12 +250,12 @@ impl Reference {
         self.joints[joint].peak[0]
     }
 
-    /// Whether a joint with a closed form moves there (not back) at this time: the branch of Eq. 15.
+    /// Whether a joint with a closed form moves there (not back) at this time; see [`LogisticPath::goes_there`].
     pub fn goes_there(&self, joint: usize, time_s: f64) -> bool {
         self.logistic_path(joint).is_some_and(|path| path.goes_there(time_s - self.start_s))
     }
 
-    /// The closed form, if available.
+    /// The closed form of a joint's motion, if available.
     pub fn logistic_path(&self, joint: usize) -> Option<&LogisticPath> {
         match &self.joints[joint].path {
             JointPath::Logistic(path) => Some(path),
@@ -302,9 +305,11 @@ impl ReferenceTable {
     }
 }
 
-/// The quintic through position, velocity and acceleration at both ends of a step `h`, at `u` of the step (0 to 1).
+/// Position, velocity and acceleration of the quintic polynomial with the given states `a` and `b` at the ends of a
+/// step `h`, at the fraction `u` of the step (0 to 1).
 fn quintic(a: &[f64; 3], b: &[f64; 3], h: f64, u: f64) -> [f64; 3] {
-    // p = q0 + v0 u + (a0/2) u² + c3 u³ + c4 u⁴ + c5 u⁵ in units of the step, from the three conditions at u = 1.
+    // p = q0 + v0 u + (a0/2) u² + c3 u³ + c4 u⁴ + c5 u⁵ with velocities and accelerations per step; the three
+    // conditions at u = 1 determine c3, c4 and c5.
     let (v0, a0, v1, a1) = (a[1] * h, a[2] * h * h, b[1] * h, b[2] * h * h);
     let distance = b[0] - a[0] - v0 - 0.5 * a0;
     let (speed, bend) = (v1 - v0 - a0, a1 - a0);

@@ -6,8 +6,8 @@ use crate::error::{FilterError, require};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Source of the commanded motion: a table written by `design`, or the closed form of the paper's strokes. A string is
-/// the file name of the table.
+/// Source of the commanded motion: a table that `design` wrote, or the closed form of logistic strokes. A string is the
+/// file name of the table.
 ///
 /// ```
 /// use dynident_recording::DifferentiatorSettings;
@@ -27,17 +27,18 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "WrittenReference")]
 pub struct ReferenceSettings {
-    /// Table with columns `t_s, q1.., dq1.., ddq1..` (SI), joints in the order of the robot description.
+    /// File of a table with the columns `t_s, q1.., dq1.., ddq1..` (SI units), joints in the order of the robot
+    /// description.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Alternative to a table: one spliced logistic function for each joint, in the same order.
+    /// Instead of a table: one spliced logistic function for each joint, in the order of the robot description.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<LogisticPath>,
-    /// Boundaries of the strokes, s after the start of the motion, for all joints; by default the strokes are the
-    /// pieces between rests.
+    /// Times between the strokes, s after the start of the motion, for all joints. By default, strokes are the parts of
+    /// the motion between rests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub strokes_s: Vec<f64>,
-    /// Start of the motion, s after the log's first row; 0 by default.
+    /// Start of the motion, s after the first row of the log; 0 by default.
     pub start_s: f64,
 }
 
@@ -75,7 +76,7 @@ impl From<WrittenReference> for ReferenceSettings {
 }
 
 impl ReferenceSettings {
-    /// Checks the settings without the table.
+    /// Checks the settings, without reading the table.
     ///
     /// # Errors
     /// [`FilterError::Reference`] if file and joints are both given or a path is invalid; [`FilterError::Setting`] if
@@ -93,7 +94,7 @@ impl ReferenceSettings {
         self.joints.iter().try_for_each(LogisticPath::validate)
     }
 
-    /// The closed form, if joints are given.
+    /// The commanded motion in closed form, if `joints` are given.
     ///
     /// # Errors
     /// As [`validate`](Self::validate).

@@ -1,13 +1,13 @@
-//! Splits a motion into strokes from rest to rest.
+//! Division of a motion into strokes from rest to rest.
 
 use serde::{Deserialize, Serialize};
 
 /// A part of a joint's motion from rest to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stroke {
-    /// Start of its samples: the middle of the rest before it, s.
+    /// Start of the samples that belong to the stroke, s: the middle of the rest before it.
     pub owns_from_s: f64,
-    /// End of its samples: the middle of the rest after it, s.
+    /// End of the samples that belong to the stroke, s: the middle of the rest after it.
     pub owns_to_s: f64,
     /// Start of the motion, s.
     pub from_s: f64,
@@ -29,7 +29,7 @@ impl Stroke {
     }
 }
 
-/// The strokes of sampled q, dq, ddq, separated by rests of at least two samples.
+/// The strokes of a sampled motion (q, dq, ddq), separated by rests of at least two samples.
 pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool]) -> Vec<Stroke> {
     let n = times_s.len();
     // A single sample at rest is a reversal, not a rest.
@@ -61,10 +61,10 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
     strokes
 }
 
-/// Number of samples of a stroke that are tested for reversals.
+/// Number of samples of a stroke at which reversals are tested.
 const TESTED_SAMPLES: u32 = 500;
 
-/// The stroke between two given times; `motion` returns the velocity and whether the joint rests at a time.
+/// The stroke between two given times. `motion` returns the velocity at a time, and whether the joint rests.
 pub(crate) fn between(from_s: f64, to_s: f64, motion: impl Fn(f64) -> (f64, bool)) -> Stroke {
     let samples = (0..TESTED_SAMPLES)
         .map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(TESTED_SAMPLES)));

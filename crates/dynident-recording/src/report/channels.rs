@@ -1,11 +1,11 @@
-//! Statistics of a channel: range, dead, quantised, saturated. Accumulated block by block.
+//! Statistics of a channel, accumulated block by block: range, and whether it is dead, quantised or saturated.
 
 use super::jumps::{BATCH, Jump, JumpCheck, LoneSample};
 use super::settings::ReportSettings;
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
-/// Minimum number of successive samples at an extreme value for a saturated torque.
+/// Minimum number of successive samples at an extreme value with which a torque is treated as saturated.
 const MIN_SATURATED_RUN: u64 = 20;
 
 /// Statistics of one channel of one joint.
@@ -24,19 +24,20 @@ pub struct ChannelReport {
     pub zero_share: f64,
     /// Longest run of successive samples at the smallest or largest value.
     pub longest_run_at_extreme: u64,
-    /// Quantisation step, if 90 % of the steps of the first rows are multiples of it.
+    /// Quantisation step: 90 % of the differences between the first rows are multiples of it; null without such a step.
     pub quantisation_step: Option<f64>,
-    /// Number of steps of a whole turn between samples (positions): angles that wrap.
+    /// For positions: number of differences between successive samples that are a whole turn, because the angle wraps
+    /// around.
     #[serde(default)]
     pub turns: u64,
-    /// Number of single samples far from both of their neighbours.
+    /// Number of single samples that are far from both of their neighbours.
     #[serde(default)]
     pub lone_samples: u64,
-    /// The one that deviates most.
+    /// The isolated sample that deviates most.
     #[serde(default)]
     pub worst_lone_sample: Option<LoneSample>,
-    /// Number of steps far larger than all others, after which the channel stays (positions): missing rows, or a stuck
-    /// encoder.
+    /// For positions: number of jumps that are far larger than all other differences and after which the channel does
+    /// not return; missing rows, or a stuck encoder.
     #[serde(default)]
     pub jumps: u64,
     /// The largest jump.
@@ -68,7 +69,7 @@ pub(crate) struct ChannelCheck {
     pub(crate) quantisation_step: Option<f64>,
 }
 
-/// A running maximum and the longest run at it.
+/// A running maximum, and the longest run of samples at it.
 #[derive(Clone, Debug)]
 struct Extreme {
     value: f64,
@@ -119,7 +120,7 @@ impl ChannelCheck {
     }
 
     pub(crate) fn add(&mut self, values: &[f64]) {
-        // If no value of a run is an extreme, one comparison replaces many.
+        // If no value of a batch is an extreme, a single comparison is sufficient.
         for run in values.chunks(BATCH) {
             let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
             for &value in run {
@@ -142,7 +143,7 @@ impl ChannelCheck {
 
     pub(crate) fn report(&self) -> ChannelReport {
         let (lone_samples, worst_lone_sample) = self.jumps.lone();
-        // Torques and derivatives may have steps.
+        // Only positions are tested, because torques and derivatives may really jump.
         let (jumps, worst_jump) = if self.quantity == Quantity::Position { self.jumps.jumps() } else { (0, None) };
         ChannelReport {
             channel: self.quantity,

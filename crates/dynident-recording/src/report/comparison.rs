@@ -1,4 +1,4 @@
-//! Compares a logged derivative with the derivative of the position.
+//! Comparison of a logged velocity or acceleration with the derivative of the position.
 
 use super::lag::{Lag, best_lag};
 use super::settings::ReportSettings;
@@ -7,40 +7,40 @@ use serde::{Deserialize, Serialize};
 
 const MAX_LAG_SAMPLES: usize = 1 << 13;
 
-/// Comparison of a logged velocity (or acceleration) with the derivative of the position, both filtered alike.
+/// Comparison of a logged velocity (or acceleration) with the derivative of the position, after the same filter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DerivativeComparison {
     /// Joint name.
     pub joint: String,
-    /// RMS of the difference over the RMS of the derivative of the position.
+    /// RMS of the difference divided by the RMS of the derivative of the position.
     pub relative_rms_difference: f64,
-    /// `Σ a b / √(Σ a² Σ b²)` of derivative a and logged signal b over the whole log, -1 to 1: close to -1 if the sign
-    /// is reversed. Not centred, so that a joint at constant velocity is evidence as well, and fast samples have more
-    /// weight. Zero if one of the signals is zero.
+    /// Correlation `Σ a b / √(Σ a² Σ b²)` of the derivative a and the logged signal b over the whole log, -1 to 1;
+    /// close to -1 if the sign is reversed. The means are not subtracted, so a joint at constant velocity is also used,
+    /// and fast samples have more weight. Zero if one of the signals is zero.
     #[serde(default)]
     pub correlation: f64,
-    /// `Σ a b / Σ a²`: factor from the derivative to the logged signal; `None` if the derivative is negligible, as for
-    /// a dead position.
+    /// Factor `Σ a b / Σ a²` from the derivative a to the logged signal b; `None` if the derivative is negligible, as
+    /// for a dead position.
     #[serde(default)]
     pub ratio: Option<f64>,
-    /// Lag of the logged signal behind the derivative, in the piece where the derivative varies most.
+    /// Time by which the logged signal is later than the derivative, in the piece where the derivative varies most.
     pub lag: Option<Lag>,
 }
 
-/// Maximum share of the logged signal's power for a negligible derivative.
+/// Power of the derivative, as a share of the logged signal's power, below which the derivative is negligible.
 const NEGLIGIBLE_POWER_SHARE: f64 = 1e-12;
 /// Units of velocity that are often mistaken for rad/s.
 const COMMON_UNITS: [&str; 2] = ["deg/s", "rpm"];
 
 impl DerivativeComparison {
-    /// Factor from the derivative to the logged signal, if they are proportional and it differs from 1.
+    /// Factor from the derivative to the logged signal, if the two are proportional and the factor differs from 1.
     pub(crate) fn times(&self, limits: &ReportSettings) -> Option<f64> {
         let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > limits.min_log_factor;
         self.ratio.filter(is_other).filter(|_| self.correlation > limits.proportional_correlation)
     }
 
-    /// Explains a velocity that is `times` the derivative, in a log at `rate_hz`.
+    /// Explains in words why a logged velocity is `times` the derivative, in a log at `rate_hz`.
     pub(crate) fn describe_velocity(times: f64, rate_hz: f64, limits: &ReportSettings) -> String {
         let is_it = |unit: &&str| {
             si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < limits.unit_tolerance)
@@ -65,7 +65,7 @@ pub(crate) struct Comparison {
     power: f64,
     logged_power: f64,
     product: f64,
-    /// Sum of the squared deviations of the derivative over the kept samples.
+    /// Sum of the squared deviations of the derivative from its mean, over the kept samples.
     variation: f64,
     derived: Vec<f64>,
     logged: Vec<f64>,
@@ -92,7 +92,7 @@ impl Comparison {
             self.logged_power += logged * logged;
             self.product += derived * logged;
         }
-        // Use a single piece, because a lag across a gap is undefined: the piece with the largest variation.
+        // Only one piece is used, because a lag across a gap is undefined: the piece with the largest variation.
         let some = &derived[..derived.len().min(MAX_LAG_SAMPLES)];
         let mean = some.iter().sum::<f64>() / some.len().max(1) as f64;
         let variation: f64 = some.iter().map(|x| (x - mean).powi(2)).sum();
@@ -103,7 +103,8 @@ impl Comparison {
         }
     }
 
-    /// The lag is searched within one period of the cut-off; a longer lag belongs to another motion.
+    /// Result of the comparison. The lag is searched within one period of the cut-off; a longer lag would belong to
+    /// another motion.
     pub(crate) fn report(&self, rate_hz: f64, cutoff_hz: f64) -> DerivativeComparison {
         let is_valid = self.power > NEGLIGIBLE_POWER_SHARE * self.logged_power;
         let difference = if is_valid { (self.difference / self.power).sqrt() } else { 0.0 };

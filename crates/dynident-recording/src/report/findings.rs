@@ -1,10 +1,10 @@
-//! Writes the findings of an [`ImportReport`] as sentences.
+//! The findings of an [`ImportReport`] in sentences.
 
 use super::{ChannelReport, DerivativeComparison, Finding, ImportReport, Jump, Level, ReportSettings};
 use crate::cleaning::{Reason, RejectedSamples};
 use crate::log::Quantity;
 
-/// `2nd`, `3rd`, `4th`, ..
+/// Ordinal number: `2nd`, `3rd`, `4th`, ..
 fn ordinal(number: u64) -> String {
     let ending = match (number % 100, number % 10) {
         (11..=13, _) => "th",
@@ -25,13 +25,13 @@ impl Findings {
     }
 }
 
-/// Smallest number of different rounded stamps that determine the rate. With fewer, rate and velocities have errors of
-/// 1 % or more, and inertias twice as much.
+/// Minimum number of different rounded stamps for an accurate rate. With fewer, rate and velocities have errors of 1 %
+/// or more, and inertias twice as much.
 const MIN_DIFFERENT_STAMPS: u64 = 100;
-/// Largest range of a position at rest (rad, m): 20 steps of an encoder with 17 bits.
+/// Maximum range of the position of a resting joint (rad, m): 20 steps of an encoder with 17 bits.
 const MAX_RANGE_AT_REST: f64 = 1e-3;
 
-/// Whether a joint rests at zero: its encoder changes by a few steps.
+/// Whether a joint rests at zero, so that its encoder changes by a few steps only.
 fn is_at_rest_at_zero(channel: &ChannelReport) -> bool {
     channel.channel == Quantity::Position && channel.max - channel.min < MAX_RANGE_AT_REST
 }
@@ -50,7 +50,7 @@ impl Channel {
 }
 
 impl ImportReport {
-    /// Derives the findings from the other fields, most severe first.
+    /// Derives the findings from the other fields of the report, the most severe first.
     pub(crate) fn find(&mut self, limits: &ReportSettings) {
         let mut findings = Findings::default();
         self.check_clock(&mut findings);
@@ -245,7 +245,7 @@ impl ImportReport {
         }
     }
 
-    /// The joints with jumps in their positions, and the advice.
+    /// Joints whose positions jump, and advice.
     fn position_jumps(&self) -> Option<(String, String)> {
         let jumping = |channel: &ChannelReport| Some((channel.joint.clone(), channel.jumps, channel.worst_jump?));
         let all: Vec<(String, u64, Jump)> = self.channels.iter().filter_map(jumping).collect();

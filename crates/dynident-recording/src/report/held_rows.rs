@@ -1,20 +1,20 @@
-//! Detects channels that a recorder repeats, with new values at every few rows only.
+//! Detection of channels whose values a recorder repeats, so that only every few rows contain a new value.
 
-/// Minimum number of changes of a moving channel.
+/// Minimum number of changes with which a channel is treated as moving.
 const MIN_CHANGES: usize = 40;
-/// Minimum share of changes at the usual distance, rows.
+/// Minimum share of changes that follow each other at the usual distance in rows.
 const MIN_EVEN_SHARE: f64 = 0.8;
-/// Minimum share of the rows with a change in which most moving channels change.
+/// Minimum share of the rows with a change in which most moving channels change together.
 const MIN_COMMON_SHARE: f64 = 0.8;
 
 /// Number of rows per new set of values, if the `channels` (one vector for each joint) change together, at even
-/// distances, and not at every row; otherwise `None`. Quantised slow channels also repeat, but each joint changes at
-/// different rows.
+/// distances, and not in every row; otherwise `None`. Slow quantised channels also repeat values, but each joint
+/// changes in different rows.
 pub(crate) fn rows_to_a_value(channels: &[Vec<f64>]) -> Option<u64> {
     let rows = channels.first()?.len();
     let moving: Vec<&Vec<f64>> =
         channels.iter().filter(|values| changes(values).take(MIN_CHANGES).count() == MIN_CHANGES).collect();
-    // A single channel may be quantised.
+    // A single channel that repeats values may be quantised.
     if moving.len() < 2 {
         return None;
     }

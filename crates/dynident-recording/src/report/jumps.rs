@@ -1,27 +1,30 @@
-//! Detects samples that no motion causes: angles that wrap after a turn, single values far from their neighbours, and
-//! jumps.
+//! Detection of samples that no motion can cause: angles that wrap around after a turn, single values far from their
+//! neighbours, and jumps.
 
 use super::settings::ReportSettings;
 use serde::{Deserialize, Serialize};
 
-/// Maximum difference of a wrapped step from a whole turn, as a share of the turn; it covers the motion of one sample.
+/// Maximum difference of a wrapped step from a whole turn, as a share of the turn; it allows for the motion during one
+/// sample.
 const TURN_TOLERANCE: f64 = 0.1;
-/// Decay of the largest step nearby per sample: it is negligible after some hundred samples.
+/// Factor per sample by which the influence of the largest step nearby decreases; it is negligible after some hundred
+/// samples.
 const DECAY: f64 = 0.99;
 /// Number of steps before the detection starts.
 const MIN_SAMPLES: u64 = 20;
-/// Number of largest steps that are kept. If all of them were jumps, they would belong to the signal.
+/// Number of largest steps that are stored. If all of them were jumps, they would belong to the signal.
 const KEPT_STEPS: usize = 8;
 
 pub(super) const BATCH: usize = 64;
-/// Less than `DECAY` to the power of `BATCH`: minimum remaining share of the largest step nearby at the end of a run.
+/// Lower bound on `DECAY` to the power of `BATCH`: the minimum influence of the largest step nearby at the end of a
+/// batch.
 const MIN_DECAY_PER_BATCH: f64 = 0.5;
 
-/// A sample far from both of its neighbours.
+/// A sample that is far from both of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoneSample {
-    /// 0-based number among the rows used.
+    /// Index of the sample among the rows used, from 0.
     pub row: u64,
     /// Value (SI).
     pub value: f64,
@@ -29,20 +32,20 @@ pub struct LoneSample {
     pub before: f64,
 }
 
-/// A step that no motion causes, after which the channel stays.
+/// A change that no motion can cause and after which the channel does not return.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Jump {
-    /// 0-based number of the sample after the step among the rows used.
+    /// Index among the rows used (from 0) of the sample after the jump.
     pub row: u64,
-    /// Value before (SI).
+    /// Value before the jump (SI).
     pub before: f64,
-    /// Value after (SI).
+    /// Value after the jump (SI).
     pub after: f64,
-    /// Largest step that is not a jump (SI).
+    /// Largest difference between successive samples that is not a jump (SI).
     pub largest_other: f64,
-    /// Period with which the channel wraps around, accurate to one step, if every jump leads from one end of its range
-    /// to the other (SI).
+    /// Period after which the channel wraps around, accurate to one step (SI), if every jump leads from one end of its
+    /// range to the other; otherwise null.
     #[serde(default)]
     pub period: Option<f64>,
 }
@@ -52,7 +55,7 @@ pub(super) struct JumpCheck {
     limits: ReportSettings,
     turn: Option<f64>,
     samples: u64,
-    /// Samples since the last gap of the stamps.
+    /// Number of samples since the last gap of the time stamps.
     since_gap: u64,
     last: [f64; 2],
     nearby: f64,
@@ -62,12 +65,12 @@ pub(super) struct JumpCheck {
     alone: u64,
     worst: Option<LoneSample>,
     worst_by: f64,
-    /// The largest steps, largest first: size, row after it, values before and after.
+    /// The largest steps, the largest first: size, row after the step, and values before and after it.
     largest: Vec<(f64, u64, [f64; 2])>,
 }
 
 impl JumpCheck {
-    /// For a channel whose angles may wrap at `turn`.
+    /// Creates the check for a channel whose angles may wrap around at `turn`.
     pub(super) fn new(turn: Option<f64>, limits: ReportSettings) -> Self {
         Self {
             limits,
@@ -86,7 +89,7 @@ impl JumpCheck {
         }
     }
 
-    /// Marks a gap of the stamps before the next sample; the change over the gap is not a jump.
+    /// Marks a gap of the time stamps before the next sample; the change over the gap is not a jump.
     pub(super) fn begin_piece(&mut self) {
         self.since_gap = 0;
     }
@@ -99,7 +102,7 @@ impl JumpCheck {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let begun = [(middle - before).abs(), (first - middle).abs()];
         let largest = values.windows(2).map(step).fold(larger(begun[0], begun[1]), larger);
-        // Fast path: no sample is isolated, wraps, or has one of the largest steps.
+        // Fast path: no sample is isolated or wraps around, and no step is one of the largest.
         let is_usual = self.since_gap >= 2
             && largest < self.limits.isolated_step_ratio * MIN_DECAY_PER_BATCH * self.nearby
             && self.turn.is_none_or(|turn| largest < 0.5 * turn)
@@ -124,7 +127,7 @@ impl JumpCheck {
         if self.since_gap >= 2 {
             let (to, from) = (middle - before, value - middle);
             let least = to.abs().min(from.abs());
-            // The next sample shows whether the previous one was isolated.
+            // Only the next sample shows whether the previous one was isolated.
             if to * from < 0.0
                 && least > self.limits.isolated_step_ratio * self.nearby
                 && self.samples > MIN_SAMPLES
@@ -135,7 +138,7 @@ impl JumpCheck {
                     self.worst_by = least;
                     self.worst = Some(LoneSample { row: self.samples - 1, value: middle, before });
                 }
-                // Ignore the isolated sample.
+                // The isolated sample is not used for later comparisons.
                 self.last = [before, value];
                 self.samples += 1;
                 self.since_gap += 1;
@@ -181,7 +184,7 @@ impl JumpCheck {
         let Some(last) = apart else { return (0, None) };
         let (_, row, [before, after]) = self.largest[0];
         let largest_other = self.largest[last + 1].0;
-        // A counter that overflows steps from one end of its range to the other.
+        // A counter that overflows jumps from one end of its range to the other.
         let is_whole_range = |kept: &(f64, u64, [f64; 2])| kept.0 >= range - 2.0 * largest_other;
         let period = self.largest[..=last].iter().all(is_whole_range).then_some(range);
         (last as u64 + 1, Some(Jump { row, before, after, largest_other, period }))
@@ -191,7 +194,7 @@ impl JumpCheck {
         self.wraps
     }
 
-    /// Number of isolated samples and the worst of them, if it deviates far enough.
+    /// Number of isolated samples, and the worst of them if it deviates far enough.
     pub(super) fn lone(&self) -> (u64, Option<LoneSample>) {
         let range = self.high - self.low;
         match self.worst {

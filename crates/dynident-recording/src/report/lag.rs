@@ -1,27 +1,28 @@
-//! Estimates the lag between two signals.
+//! Estimation of the lag between two signals.
 
 use serde::{Deserialize, Serialize};
 
-/// The shift with the maximum correlation of two signals.
+/// The time shift with the maximum correlation between two signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Lag {
-    /// Lag of the second signal behind the first, s; negative if it is ahead.
+    /// Time by which the second signal is later than the first, s; negative if it is earlier.
     pub seconds: f64,
     /// Lag in samples, interpolated by a parabola through the three best correlations.
     pub samples: f64,
-    /// Correlation at the lag, -1 to 1, of the largest magnitude; negative if the second signal is reversed.
+    /// Correlation with this shift, -1 to 1, which has the largest magnitude; negative if the second signal is
+    /// reversed.
     pub correlation: f64,
     /// Correlation without a shift.
     pub correlation_unshifted: f64,
-    /// Whether the maximum is at the limit of the search: the true lag may be longer, or undefined.
+    /// Whether the maximum is at the limit of the search. The true lag may then be longer, or undefined.
     pub at_limit: bool,
 }
 
-/// The lag of `b` behind `a`, searched up to `max_lag_samples` in both directions: the shift `k` with the maximum
-/// `|corr(a[i], b[i + k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola.
-/// `None` for signals that are constant, not finite, or shorter than three times the maximum lag. Filter both signals
-/// alike before.
+/// Lag of the signal `b` behind the signal `a`, searched up to `max_lag_samples` in both directions. It is the shift
+/// `k` with the maximum `|corr(a[i], b[i + k])|` (Pearson's correlation, the same samples of `a` for every shift),
+/// refined by a parabola. `None` for signals that are constant, not finite, or shorter than three times the maximum
+/// lag. Both signals must have passed the same filter.
 pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> Option<Lag> {
     let n = a.len().min(b.len());
     if n < 3 * max_lag_samples.max(1) || !(rate_hz.is_finite() && rate_hz > 0.0) {
@@ -57,8 +58,8 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
 }
 
 impl Lag {
-    /// Whether the shift explains at least half of the difference between the signals. Slow signals match at any small
-    /// shift, so that the best one has no meaning.
+    /// Whether the lag is significant: the shift explains at least half of the difference between the signals. Slow
+    /// signals agree with any small shift, so their best shift has no meaning.
     pub fn matters(&self) -> bool {
         let unexplained = |correlation: f64| 1.0 - correlation * correlation;
         !self.at_limit && unexplained(self.correlation) < 0.5 * unexplained(self.correlation_unshifted)
@@ -67,9 +68,9 @@ impl Lag {
 
 const PARALLEL_LAGS: usize = 8;
 
-/// Pearson's correlation of `a` with `b` from its samples 0, 1, ... on; not finite if a signal is constant or not
-/// finite, meaningless if `b` is too short. The compiler vectorises the loops over lags; the sums of each lag keep
-/// their order.
+/// Pearson's correlation of `a` with `b` from sample 0, 1, 2, ... of `b` on. The value is not finite if a signal is
+/// constant or not finite, and meaningless if `b` is too short. The compiler vectorises the loops over lags; the order
+/// of summation for each lag is fixed.
 fn correlations_from(a: &[f64], b: &[f64]) -> [f64; PARALLEL_LAGS] {
     let n = a.len() as f64;
     let mut padded = b.to_vec();

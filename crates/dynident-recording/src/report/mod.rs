@@ -1,8 +1,9 @@
-//! Findings in a log, for people and programs.
+//! Findings about a log, for people and programs.
 //!
-//! `ChannelCheck` tests every channel (dead, saturated, quantised), `TimeCheck` the steps of the stamps, and
-//! `Comparison` compares logged velocities and accelerations with the derivatives of the position, shifted by
-//! [`best_lag`]. [`ImportReport`] contains all results, and the important ones as [`Finding`]s in sentences.
+//! `ChannelCheck` tests whether channels are dead, saturated or quantised, and `TimeCheck` tests the steps between time
+//! stamps. `Comparison` compares logged velocities and accelerations with the derivatives of the position, and finds
+//! their lag with [`best_lag`]. [`ImportReport`] contains all results, and the important ones as [`Finding`]s in
+//! sentences.
 
 pub(crate) mod channels;
 pub(crate) mod comparison;
@@ -31,11 +32,11 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Information.
+    /// Information only.
     Info,
-    /// May degrade the result.
+    /// May make the result worse.
     Warning,
-    /// Degrades the result.
+    /// Makes the result worse.
     Problem,
 }
 
@@ -45,20 +46,20 @@ pub enum Level {
 pub struct Finding {
     /// Severity.
     pub level: Level,
-    /// Place: `time`, `rows`, or a quantity and joint such as `torque arm_5`.
+    /// Subject: `time`, `rows`, or a quantity and joint such as `torque arm_5`.
     pub channel: String,
     /// Description in one sentence.
     pub message: String,
-    /// Code, which `dynident docs` explains; empty in results of older versions.
+    /// Code of the finding; `dynident docs CODE` explains it. Empty in results of older versions.
     #[serde(default)]
     pub code: String,
 }
 
-/// A step between successive samples that is longer than three median steps.
+/// A gap: a step between successive samples that is longer than three median steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Gap {
-    /// 0-based data row before the gap.
+    /// Data row before the gap, from 0.
     pub row: u64,
     /// Start of the gap, s after the first row of the file.
     pub time_s: f64,
@@ -102,15 +103,15 @@ pub struct ImportReport {
     pub duplicate_stamps: u64,
     /// Number of stamps earlier than the previous one.
     pub backward_stamps: u64,
-    /// Number of samples left out because they are too close to the previous one.
+    /// Number of samples that were omitted because they are too close to the previous one.
     pub crowded_samples: u64,
-    /// Rows and lines that were left out.
+    /// Rows and lines that were omitted.
     pub dropped: LinesDropped,
     /// Number of uninterrupted pieces used.
     pub segments: usize,
     /// Number of pieces too short for the filter, and of samples in them.
     pub short_segments: [u64; 2],
-    /// Number of samples left out because the differentiator does not apply there.
+    /// Number of samples that were omitted because the differentiator is not valid for them.
     pub unmapped_samples: u64,
     /// Number of rows per new set of positions, if the recorder repeats positions.
     #[serde(default)]
@@ -118,11 +119,11 @@ pub struct ImportReport {
     /// Number of rows per new set of torques, if the recorder repeats torques.
     #[serde(default)]
     pub rows_to_a_torque: Option<u64>,
-    /// Samples whose torque is ignored, and replaced positions, by joint.
+    /// Samples whose torque is ignored, and positions that were replaced, by joint.
     #[serde(default)]
     pub set_aside: Vec<RejectedSamples>,
-    /// Number of gaps that were filled because they are short compared with the motion, and of samples in them; these
-    /// are not used as rows.
+    /// Number of gaps that were filled because they are short compared with the motion, and number of samples in them.
+    /// These samples are not used as rows of the fit.
     #[serde(default)]
     pub bridged: [u64; 2],
     /// Statistics of every channel of every joint.
@@ -133,8 +134,8 @@ pub struct ImportReport {
     pub acceleration: Vec<DerivativeComparison>,
     /// The cut-off estimated from the data (used unless the settings contain one).
     pub cutoff: CutoffChoice,
-    /// For every joint, the standard deviation of the position noise per sample (rad, m), taken as white, in the pass
-    /// band: see [`position_noise()`](crate::position_noise()). Zero for a channel that never changes.
+    /// For every joint, the standard deviation of the position noise in one sample (rad, m), if the noise in the pass
+    /// band were white: see [`position_noise()`](crate::position_noise()). Zero for a channel that never changes.
     #[serde(default)]
     pub position_noise: Vec<f64>,
     /// The important results in sentences.
@@ -142,7 +143,7 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
-    /// Whether the isolated samples of a channel were left out or replaced.
+    /// Whether the isolated samples of a channel were excluded or replaced.
     pub fn sets_aside(&self, channel: &ChannelReport) -> bool {
         self.set_aside.iter().any(|found| {
             found.channel == channel.channel

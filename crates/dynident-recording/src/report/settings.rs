@@ -1,33 +1,35 @@
-//! Limits of the findings in a log.
+//! Limits above which findings about a log are reported.
 
 use crate::error::{FilterError, require};
 
 /// Limits above which a finding is reported. They are not part of a study file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReportSettings {
-    /// Maximum share of rejected samples that is reported as information, 0.005 by default; a larger share is a
-    /// warning.
+    /// Maximum share of rejected samples that is reported as information; a larger share is a warning. 0.005 by
+    /// default.
     pub max_info_share: f64,
-    /// Minimum ratio of an isolated sample's steps, before and after it, to the largest step nearby, 20 by default.
+    /// Minimum ratio of the steps before and after an isolated sample to the largest step nearby, 20 by default.
     pub isolated_step_ratio: f64,
-    /// Minimum deviation of an isolated sample as a share of the range of all others, 0.25 by default.
+    /// Minimum deviation of an isolated sample, as a share of the range of all other samples, 0.25 by default.
     pub isolated_range_share: f64,
     /// Minimum ratio of a position jump to the largest step of the motion, 5 by default.
     pub jump_step_ratio: f64,
-    /// Minimum size of a position jump as a share of the channel's range, 0.01 by default: encoders flicker at rest.
+    /// Minimum size of a position jump, as a share of the channel's range, 0.01 by default. (The position of an encoder
+    /// at rest changes by single counts.)
     pub jump_range_share: f64,
     /// Correlation of a logged velocity with the derivative of the position, above which the two are treated as
     /// proportional, 0.98 by default.
     pub proportional_correlation: f64,
-    /// Smallest logarithm of the ratio of a logged velocity to the derivative of the position that is reported as
-    /// another unit or sample rate, 0.05 by default.
+    /// Minimum logarithm of the ratio of a logged velocity to the derivative of the position with which another unit or
+    /// sample rate is reported, 0.05 by default.
     pub min_log_factor: f64,
-    /// Maximum relative difference of this factor from that of a unit, 0.02 by default.
+    /// Maximum relative difference of this ratio from the factor of a unit, for the unit to be named, 0.02 by default.
     pub unit_tolerance: f64,
-    /// Correlation of a logged derivative with that of the position, below which the signs are reported as opposite,
-    /// -0.5 by default.
+    /// Correlation of a logged derivative with the derivative of the position below which the signs are reported as
+    /// opposite, -0.5 by default.
     pub opposite_correlation: f64,
-    /// Minimum RMS difference of a logged derivative from that of the position, %, for a warning, 20 by default.
+    /// Minimum RMS difference of a logged derivative from the derivative of the position, %, with which a warning is
+    /// reported, 20 by default.
     pub min_difference_percent: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Time steps, gaps and stamps out of order, accumulated row by row.
+//! Statistics of time steps, gaps and stamps out of order, accumulated row by row.
 
 use super::{Gap, Steps};
 
@@ -40,7 +40,7 @@ impl TimeCheck {
             }
             self.min = self.min.min(step);
             self.max = self.max.max(step);
-            // Welford's recursion keeps precision for nearly constant steps.
+            // Welford's recursion is accurate for nearly constant steps.
             self.count += 1.0;
             let difference = step - self.mean;
             self.mean += difference / self.count;

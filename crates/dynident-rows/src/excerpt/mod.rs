@@ -1,9 +1,10 @@
 //! Excerpts of long logs for model selection.
 //!
-//! Drives, cut-off, friction and lag are selected in dozens of passes, and more rows add little after some minutes of
-//! recording. So selection uses an excerpt of bounded length: first every n-th row after a low-pass, as far as the
-//! motion allows the lower rate; then, if still too long, pieces spread evenly over the log
-//! ([`Pieces`](pieces::Pieces)). The final fit uses all rows and reads a long log once.
+//! Dynident selects drive inertia, cut-off, friction and lag in dozens of passes over the logs. After some minutes of
+//! recording, more rows improve this selection little. It therefore uses an excerpt of bounded length. First the rate
+//! is reduced (a low-pass, then every n-th row) as far as the motion allows. If the excerpt is still too long, it keeps
+//! pieces that are spread evenly over the log ([`Pieces`](pieces::Pieces)). The final fit uses all rows and reads a
+//! long log once.
 
 mod pieces;
 
@@ -16,26 +17,29 @@ use dynident_recording::{
 };
 use pieces::Pieces;
 
-/// Total training rows above which an excerpt is made, and its maximum size. At 1 kHz this is two to three minutes,
-/// several times the length of the public recordings.
+/// Largest total number of training rows that are used without an excerpt; also the size of excerpts. At 1 kHz it is
+/// about three minutes, several times the length of the public recordings.
 const MAX_TOTAL_ROWS: u64 = 200_000;
-/// Minimum number of samples in an excerpt per period of the positions' cut-off. Friction steps are far shorter than
-/// this period: with 100 samples the Stribeck effect of a simulated arm was no longer identifiable, with 400 it was.
+/// Minimum number of samples of an excerpt per period of the positions' cut-off frequency. The change of friction at a
+/// reversal is much shorter than this period: with 100 samples, the Stribeck effect of a simulated arm was no longer
+/// identifiable; with 400 samples it was.
 const MIN_SAMPLES_PER_PERIOD: f64 = 400.0;
-/// Half-gain frequency of the low-pass before decimation, as a ratio of the decimated rate. Frequencies below 0.4 pass.
+/// Half-gain frequency of the low-pass before decimation, relative to the decimated rate. Frequencies below 0.4 of that
+/// rate pass unchanged.
 const HALF_GAIN_RATIO: f64 = 0.45;
 const TRANSITION_RATIO: f64 = 0.1;
 /// Minimum number of rows kept of each log; shorter logs are kept whole.
 const MIN_ROWS_PER_LOG: u64 = 20_000;
 /// Minimum length of a piece in periods of the cut-off; the filters' end effects last one or two periods.
 const MIN_PERIODS_PER_PIECE: f64 = 30.0;
-/// Maximum ratio of rows with invalid torque of some joint. Above it no excerpt is made, because the other joints would
-/// lose these rows too.
+/// Maximum share of rows in which the torque of some joint is invalid. Above it no excerpt is made, because an excerpt
+/// drops such rows for all joints.
 const MAX_REJECTED_RATIO: f64 = 0.1;
 
 /// Replaces the long recordings among `training` by excerpts. `None` if their total length is small, if there is
-/// nothing to select (`has_choices`: automatic drive inertia or friction), or if a setting is in samples: the factor of
-/// the parallel filter, or a differentiator without a cut-off or with a reference.
+/// nothing to select (`has_choices` states whether drive inertia or friction is automatic), or if a setting depends on
+/// the sample rate: the decimation factor of the parallel filter, or a differentiator without a cut-off or with a
+/// reference.
 ///
 /// # Errors
 /// A recording cannot be read.
@@ -76,7 +80,8 @@ pub fn excerpts(
     Ok(changed.then_some(found))
 }
 
-/// Excerpt of about `most` rows of a log, read in a separate thread with `beside`. `None` if too many rows are invalid.
+/// Excerpt of about `most` rows of a log. If `beside` is true, a separate thread reads the log. `None` if too many rows
+/// are invalid.
 fn excerpt(
     recording: &Recording,
     log: &Log,
@@ -85,7 +90,8 @@ fn excerpt(
     beside: bool,
 ) -> Result<Option<(Log, Whole)>, LogError> {
     let named = |source: RecordingError| LogError::recording(&recording.name, source);
-    // Logged velocities and accelerations only serve comparison; later passes handle lag and ends.
+    // Logged velocities and accelerations are only used for comparison. Lag and ends of the log are treated in later
+    // passes.
     let mut read = log.clone();
     (read.format.velocity, read.format.acceleration) = (None, None);
     let (keep_outliers, limits) = (settings.keep_outliers, settings.limits.clone());
@@ -108,7 +114,7 @@ fn excerpt(
     let Some(samples) = thinning.samples(log.joints.len(), log.format.temperature.is_some()) else { return Ok(None) };
     let mut excerpt = samples.into_log(&log.source().label(), &log.joints).map_err(named)?;
     excerpt.format.bridge_gaps = log.format.bridge_gaps;
-    // The log's white noise after the low-pass.
+    // White noise of the log after the low-pass.
     let thinned = |noise: &f64| noise / (factor as f64).sqrt();
     let position_noise = stream.position_noise().iter().map(thinned).collect();
     Ok(Some((excerpt, Whole { rows, cutoff: stream.cutoff().clone(), position_noise })))
@@ -118,9 +124,9 @@ struct Thinning {
     factor: usize,
     pieces: Pieces,
     segment: Option<usize>,
-    /// Filter of positions, torques and temperatures, and the time of the segment's first sample.
+    /// Filter of positions, torques and temperatures, and the time of the first sample of the segment.
     decimator: Option<(Decimator, f64)>,
-    /// Samples of the segment with invalid torque of some joint, from sample `first_marked` on.
+    /// For each sample of the segment from `first_marked` on, whether the torque of some joint is invalid.
     marked: Vec<bool>,
     first_marked: usize,
     produced: u64,
@@ -177,7 +183,7 @@ impl Thinning {
             centre = decimator.input_row(self.produced) as usize;
             self.produced += 1;
             self.rows += 1;
-            // A row represents the samples nearest to it and is valid if at least half of them are.
+            // A row represents the samples nearest to it. It is valid if at least half of these samples are valid.
             let from = centre.saturating_sub(self.factor / 2).max(self.first_marked) - self.first_marked;
             let nearest = &self.marked[from..(centre + self.factor / 2 + 1 - self.first_marked).min(self.marked.len())];
             if 2 * nearest.iter().filter(|marked| **marked).count() > nearest.len() {

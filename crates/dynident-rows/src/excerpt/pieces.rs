@@ -1,21 +1,22 @@
 //! Evenly spaced pieces of a stream of rows, within a maximum number of rows.
 
-/// Divisor of the maximum number of rows for the length of a piece: few pieces have few end effects.
+/// Divisor of the maximum number of rows that gives the length of a piece. Few long pieces lose few rows to end
+/// effects.
 const PIECES_PER_EXCERPT: usize = 8;
 
 /// Kept rows: every `stride`-th piece, all of equal length except before interruptions.
 ///
-/// The length of a stream is unknown while it lasts. So all pieces are kept until the room is full. Then every other
-/// piece is dropped and the stride doubles. At the end about half of the maximum number of rows or more is used, in
-/// equally spaced pieces.
+/// The length of a stream is unknown until its end. Therefore all pieces are kept until the maximum number of rows is
+/// reached. Then every other piece is dropped and the stride doubles. At the end the kept pieces are equally spaced and
+/// contain at least about half of the maximum number of rows.
 pub(super) struct Pieces {
-    /// Maximum number of rows, and rows per piece.
+    /// Maximum number of rows in total, and number of rows in a piece.
     most: usize,
     length: usize,
     stride: usize,
     begun: usize,
     kept: Vec<Piece>,
-    /// Whether the current piece is kept, and its number of rows.
+    /// Whether the current piece is kept, and the number of its rows so far.
     keeping: bool,
     rows: usize,
 }
@@ -28,7 +29,7 @@ struct Piece {
 }
 
 impl Pieces {
-    /// At most about `most` rows in pieces of at least `least` rows; always room for two pieces.
+    /// Storage for about `most` rows in pieces of at least `least` rows, and for at least two pieces.
     pub(super) fn new(most: usize, least: usize) -> Self {
         let length = (most / PIECES_PER_EXCERPT).max(least).max(1);
         Self { most, length, stride: 1, begun: 0, kept: Vec::new(), keeping: false, rows: length }
@@ -73,7 +74,7 @@ impl Pieces {
         self.kept.iter().map(|piece| piece.time_s.len()).sum()
     }
 
-    /// Times, and the values of all kept rows column by column.
+    /// Times of all kept rows, and their values column by column.
     pub(super) fn columns(self) -> (Vec<f64>, Vec<Vec<f64>>) {
         let width = self.kept.iter().map(|piece| piece.width).max().unwrap_or(0);
         let of_column = |column: usize| -> Vec<f64> {

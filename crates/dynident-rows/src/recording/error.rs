@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// This log cannot be read. The text after its name has the cause and the fix.
+    /// This log cannot be read. The text after its name contains the cause and the fix.
     #[error("log `{log}`: {source}")]
     Recording {
         /// Log.
@@ -34,7 +34,8 @@ pub enum LogError {
         /// Log.
         log: String,
     },
-    /// `[parallel_filter]` does not fit the sampling rate of this log. The text after the section has the cause.
+    /// `[parallel_filter]` does not fit the sampling rate of this log. The text after the section name contains the
+    /// cause.
     #[error("log `{log}`, [parallel_filter]: {source}")]
     Filter {
         /// Log.
@@ -84,7 +85,7 @@ pub enum LogError {
         needed: usize,
     },
     /// The samples of this log cannot be used in the fit, for example because a value is too large. The text after the
-    /// name has the cause.
+    /// name contains the cause.
     #[error("{log}: {source}")]
     Rows {
         /// Log.
@@ -92,7 +93,7 @@ pub enum LogError {
         /// Cause.
         source: EstimationError,
     },
-    /// The consumer rejects the rows.
+    /// The receiver of the rows rejects them.
     #[error("{0}")]
     Refused(#[from] EstimationError),
 }

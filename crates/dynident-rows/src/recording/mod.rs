@@ -27,7 +27,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// Name in files.
+    /// Name of the role in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identify => "identify",
@@ -39,10 +39,10 @@ impl Role {
 /// Source of the motion of a recording.
 #[derive(Clone, Debug)]
 pub enum Samples {
-    /// Raw samples of a file, a stream or arrays; Dynident resamples, filters and differentiates them. Joints are found
-    /// by name.
+    /// Raw samples of a file, a stream or arrays, which Dynident resamples, filters and differentiates. Joints are
+    /// found by name.
     Log(Box<Log>),
-    /// Prepared motion, joints in the order of the model.
+    /// Positions, velocities and accelerations that the caller has prepared, joints in the order of the model.
     Motion(Box<MotionRecord>),
 }
 
@@ -55,11 +55,11 @@ pub struct Recording {
     pub role: Role,
     /// Samples.
     pub samples: Samples,
-    /// Commanded motion, joints in the order of the model, for differentiators and estimators that need it.
+    /// Commanded motion, joints in the order of the model; required by some differentiators and estimators.
     pub commanded: Option<Arc<Reference>>,
     /// Name of the payload during the recording.
     pub payload: Option<String>,
-    /// Properties of the complete recording if this is an excerpt.
+    /// Properties of the complete recording, if this recording is an excerpt.
     pub whole: Option<Whole>,
 }
 
@@ -75,22 +75,22 @@ pub struct Whole {
 }
 
 impl Recording {
-    /// A log for the fit.
+    /// A log that is used to fit the model.
     pub fn training(name: impl Into<String>, log: Log) -> Self {
         Self::new(name.into(), Role::Identify, Samples::Log(Box::new(log)))
     }
 
-    /// A log for the test.
+    /// A log that is used to test the model.
     pub fn held_out(name: impl Into<String>, log: Log) -> Self {
         Self::new(name.into(), Role::Validate, Samples::Log(Box::new(log)))
     }
 
-    /// A prepared motion for the fit.
+    /// A prepared motion that is used to fit the model.
     pub fn of_motion(name: impl Into<String>, motion: MotionRecord) -> Self {
         Self::new(name.into(), Role::Identify, Samples::Motion(Box::new(motion)))
     }
 
-    /// A training log of which only factors are left: it has a name but no samples.
+    /// A training log whose samples are no longer available, only its factors.
     pub fn without_samples(name: String) -> Self {
         let motion = Arc::new(MotionBlock::default());
         let record = MotionRecord { label: name.clone(), motion, usable: Vec::new(), windows: None, raw: None };
@@ -101,7 +101,7 @@ impl Recording {
         Self { name, role, samples, commanded: None, payload: None, whole: None }
     }
 
-    /// Label in messages about its rows: the path of a file, or the label of its samples.
+    /// Label of the recording in messages about its rows: the path of a file, or the label of its samples.
     pub fn label(&self) -> String {
         match &self.samples {
             Samples::Log(log) => log.source().label(),
@@ -117,7 +117,8 @@ impl Recording {
         }
     }
 
-    /// Includes every row if only samples at the ends are unusable. `None` if rows in between are unusable.
+    /// The same recording with unusable samples at its ends treated as usable. `None` if samples in between are
+    /// unusable.
     pub fn with_every_row(&self) -> Option<Self> {
         match &self.samples {
             Samples::Log(_) => Some(self.clone()),
@@ -128,7 +129,7 @@ impl Recording {
         }
     }
 
-    /// Approximate number of rows of the complete recording.
+    /// Approximate number of rows of the complete recording, also for an excerpt.
     pub fn rows_of_whole(&self) -> Option<u64> {
         self.whole.as_ref().map_or_else(|| self.estimated_rows(), |whole| Some(whole.rows))
     }
@@ -162,7 +163,7 @@ impl Recording {
         }
     }
 
-    /// Settings with lags in the order of the recording's joints.
+    /// Motion settings with their lags in the order of the recording's joints.
     ///
     /// # Errors
     /// The recording lacks a joint.
@@ -183,8 +184,8 @@ impl Recording {
         Ok(Cow::Owned(MotionSettings { torque_lag_s: Some(OneOrMany::Many(ordered)), ..motion.clone() }))
     }
 
-    /// Opens the log as a motion stream, with the commanded motion if the differentiator needs it. `None` for a
-    /// prepared motion without raw samples.
+    /// Opens the log as a stream of positions, velocities, accelerations and torques, with the commanded motion if the
+    /// differentiator needs it. `None` for a prepared motion without raw samples.
     ///
     /// # Errors
     /// The log cannot be opened.
@@ -204,7 +205,7 @@ impl Recording {
                 }
                 commanded.reordered(&order).map(Arc::new)
             }
-            // The differentiator reports a missing reference.
+            // The differentiator reports that the commanded motion is missing.
             _ => None,
         };
         let stream = MotionStream::following(log, &*self.in_log_order(model, motion)?, reference.as_ref());

@@ -15,12 +15,13 @@ pub struct MotionRecord {
     pub usable: Vec<bool>,
     /// For each joint the intervals (from, to; s) with valid torque; `None` if torque is always valid.
     pub windows: Option<Vec<Vec<[f64; 2]>>>,
-    /// Raw samples for estimators that smooth or simulate again; joints in the order of the model.
+    /// Raw samples of the same motion, joints in the order of the model, for estimators that smooth the positions or
+    /// simulate the motion.
     pub raw: Option<Log>,
 }
 
 impl MotionRecord {
-    /// Applies `settings`: corrects a stated torque lag.
+    /// The motion with the torque lag that `settings` state corrected.
     pub fn as_set(&self, settings: &MotionSettings) -> Cow<'_, Self> {
         match &settings.torque_lag_s {
             Some(lag_s) => {
@@ -31,7 +32,7 @@ impl MotionRecord {
         }
     }
 
-    /// Includes every row if only samples at the ends are unusable.
+    /// The same motion with unusable samples at its ends treated as usable. `None` if samples in between are unusable.
     pub fn with_every_row(&self) -> Option<Self> {
         let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);
         let last = self.usable.iter().rposition(|usable| *usable).unwrap_or(0);

@@ -20,7 +20,8 @@ pub struct RowBuilder<'a> {
 
 #[derive(Debug)]
 pub(super) struct PanelFilter<'a> {
-    /// For each joint the number of leading columns that are not filtered: bodies that only provide the load.
+    /// For each joint the number of leading columns that are not filtered: columns of bodies that are only used to
+    /// compute the load of load-dependent friction.
     unfiltered: Vec<usize>,
     filters: JointFilters,
     mask: Option<RowMask<'a>>,
@@ -29,7 +30,7 @@ pub(super) struct PanelFilter<'a> {
 }
 
 impl<'a> RowBuilder<'a> {
-    /// Builder for samples at `rate_hz`; joint `j` of the model has index `places[j]` in the motion.
+    /// Creates a builder for samples at `rate_hz`; joint `j` of the model has index `places[j]` in the motion.
     ///
     /// # Errors
     /// The filter is impossible at this rate.
@@ -42,8 +43,8 @@ impl<'a> RowBuilder<'a> {
         Self::of(PanelMaker::new(model, places), vec![0; model.dof()], rate_hz, filter)
     }
 
-    /// Builder of only some `terms` of the model: the rows of each joint have the terms that act on it, in order, and
-    /// its torque.
+    /// Creates a builder for only some `terms` of the model. A row of a joint contains the terms that act on this
+    /// joint, in order, and the torque.
     pub(super) fn of_terms(
         model: &'a RegressorModel,
         terms: &[Column],
@@ -73,7 +74,7 @@ impl<'a> RowBuilder<'a> {
         Ok(Self { maker, filter, panels: SamplePanels::default() })
     }
 
-    /// Adds a mask of invalid rows.
+    /// Adds a mask that drops invalid rows.
     pub fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
         self.filter.mask = mask;
         self
@@ -84,22 +85,22 @@ impl<'a> RowBuilder<'a> {
         self.maker.places()
     }
 
-    /// Samples on each side of a filtered row that the filter uses.
+    /// Number of samples before and after a filtered row that the filter uses.
     pub fn reach(&self) -> usize {
         self.filter.filters.reach()
     }
 
-    /// Samples that the first filtered row needs.
+    /// Number of samples that the first filtered row needs.
     pub fn needed(&self) -> usize {
         self.filter.filters.needed()
     }
 
-    /// Filtered rows of each joint up to now, valid or not.
+    /// Number of filtered rows of each joint so far, valid or not.
     pub fn filtered_rows(&self) -> u64 {
         self.filter.filtered_rows
     }
 
-    /// Samples up to now.
+    /// Number of samples so far.
     pub fn samples(&self) -> u64 {
         self.maker.samples()
     }
@@ -109,7 +110,7 @@ impl<'a> RowBuilder<'a> {
         self.maker.into_velocities()
     }
 
-    /// The two stages: samples to panels, panels to rows.
+    /// The two stages of the builder: samples to panels, and panels to filtered rows.
     pub(super) fn halves(&mut self) -> (&mut PanelMaker<'a>, &mut PanelFilter<'a>) {
         (&mut self.maker, &mut self.filter)
     }

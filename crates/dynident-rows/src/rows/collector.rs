@@ -47,10 +47,10 @@ impl RowConsumer for Collector {
     }
 }
 
-/// Forwards rows to a consumer and collects them while they fit.
+/// Passes rows on to a consumer and stores them while they fit into memory.
 pub(super) struct ForwardingCollector<'c> {
     consumer: &'c mut dyn RowConsumer,
-    /// `None` once they exceed the limit.
+    /// Stored rows; `None` once they exceed the limit.
     pub(super) rows: Option<Collector>,
     values: usize,
 }

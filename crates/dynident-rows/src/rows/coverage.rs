@@ -1,23 +1,24 @@
-//! Masking of invalid samples before the filter.
+//! Exclusion of invalid samples from filtered rows.
 
 use super::JointRows;
 use dynident_recording::{DecimationSettings, FilterError};
 
-/// Minimum share of a filter's weight on valid samples for a valid row.
+/// Minimum share of the filter's weight that must be on valid samples for a valid row.
 const MIN_COVERAGE: f64 = 0.5;
 
-/// Masks samples of regressor and torque, and tracks the remaining weight of each filtered row.
+/// Sets invalid samples of regressor W and torque τ to zero before the low-pass, and computes the remaining filter
+/// weight of each filtered row.
 ///
-/// A filtered row is `Σ h_k [W_k | τ_k]`. With a mask `m_k` of zeros (invalid samples) and ones, `Σ h_k m_k [W_k |
-/// τ_k]` satisfies the same equation `τ = W θ` with the same θ for any `m`, so the mask adds no bias. Rows are divided
-/// by their coverage `c = Σ h_k m_k` (at least one half) to keep their scale. Rows with a coverage below one half are
-/// invalid ([`JointRows::counted`]).
+/// A filtered row is `Σ h_k [W_k | τ_k]`, with the filter coefficients `h_k`. With `m_k = 0` for invalid samples and
+/// `m_k = 1` for the others, `Σ h_k m_k [W_k | τ_k]` satisfies the same equation `τ = W θ` with the same parameters θ
+/// for any `m`, so the exclusion of samples adds no bias. Rows are divided by their coverage `c = Σ h_k m_k` (at least
+/// one half) to keep their scale. Rows with a coverage below one half are invalid ([`JointRows::counted`]).
 #[derive(Debug)]
 pub(super) struct Coverage {
     taps: Vec<f64>,
     factor: usize,
     samples: usize,
-    /// For each joint the masked samples that later rows still contain, and the number of rows up to now.
+    /// For each joint the invalid samples that later rows still contain, and the number of rows so far.
     joints: Vec<(Vec<usize>, usize)>,
     panel: Vec<f64>,
     shares: Vec<f64>,
@@ -44,7 +45,7 @@ impl Coverage {
         });
     }
 
-    /// The panel with the samples of `set_aside` masked; an empty `set_aside` masks nothing.
+    /// The panel with the samples of `set_aside` (invalid samples) set to zero; unchanged if `set_aside` is empty.
     pub(super) fn mask<'a>(
         &'a mut self,
         joint: usize,
@@ -70,7 +71,7 @@ impl Coverage {
         self.samples += samples;
     }
 
-    /// Divides the next rows of a joint by their coverage and returns it; empty if no sample is masked.
+    /// Divides the next rows of a joint by their coverage and returns the coverage; empty if all samples are valid.
     pub(super) fn divide(&mut self, joint: usize, rows: usize, panel: &mut [f64]) -> &[f64] {
         let (masked, done) = &mut self.joints[joint];
         self.shares.clear();
@@ -94,7 +95,7 @@ impl Coverage {
     }
 }
 
-/// Divides a column by the coverage of its rows, at least one half; empty coverage changes nothing.
+/// Divides a column by the coverage of its rows (at least one half); an empty coverage changes nothing.
 pub fn divide_by_coverage(column: &mut [f64], coverage: &[f64]) {
     for (value, coverage) in column.iter_mut().zip(coverage) {
         *value /= coverage.max(MIN_COVERAGE);
@@ -107,8 +108,8 @@ impl<'a> JointRows<'a> {
         self.coverage.get(row).is_none_or(|coverage| *coverage >= MIN_COVERAGE)
     }
 
-    /// Valid rows: those with at least half of the filter's weight on valid samples. `buffer` stores them if some rows
-    /// are invalid.
+    /// The valid rows: rows with at least half of the filter's weight on valid samples. `buffer` stores them if some
+    /// rows are invalid.
     pub fn counted<'b>(&self, buffer: &'b mut Vec<f64>) -> JointRows<'b>
     where
         'a: 'b,

@@ -1,4 +1,4 @@
-//! Logs outside of the domain of a declared torque.
+//! Check that a log is within the domain of the torques declared by `[[torque]]`.
 
 use super::samples::in_model_order;
 use crate::recording::LogError;
@@ -6,7 +6,8 @@ use crate::regressor_model::RegressorModel;
 use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 
-/// Checks that every declared torque of the model is defined at each settled sample of a block.
+/// Checks that every declared torque of the model is defined at each sample of a block, except in the end effects of
+/// the differentiator.
 pub(super) fn require_declared(
     model: &RegressorModel,
     log: &str,

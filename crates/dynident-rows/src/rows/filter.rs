@@ -4,15 +4,15 @@ use dynident_recording::{DecimationSettings, MotionSettings};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Settings of the parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every
+/// Settings of the parallel filter. Torque and every regressor column pass the same zero-phase low-pass; then every
 /// n-th row is kept.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ParallelFilterSettings {
-    /// Whether the filter is on (default); otherwise every sample is a row.
+    /// Whether the filter is used (default). Without it, every sample is a row.
     pub enabled: bool,
-    /// Decimation factor. The default puts the filter's cut-off at 0.7 of the motion's cut-off.
+    /// Decimation factor. By default the cut-off of the filter is 0.7 of the cut-off of the motion.
     pub factor: Option<usize>,
     /// Half-gain frequency, hertz; by default 0.4 of the decimated rate.
     pub cutoff_hz: Option<f64>,
@@ -61,9 +61,9 @@ impl ParallelFilterSettings {
         Ok(())
     }
 
-    /// Default number of rows per second for this cut-off of the motion. The motion's cut-off is twice its highest
-    /// frequency. With a Nyquist frequency of 7/8 of the cut-off, the filter's half-gain frequency is 0.7 of the
-    /// cut-off, which is above all motion.
+    /// Default number of rows per second for this cut-off of the motion. The cut-off of the motion is twice its highest
+    /// frequency. The Nyquist frequency of the rows is 7/8 of the cut-off, so that the half-gain frequency of the
+    /// filter is 0.7 of the cut-off, above all motion.
     pub fn rows_per_s(motion_cutoff_hz: f64) -> f64 {
         1.75 * motion_cutoff_hz
     }
@@ -73,7 +73,7 @@ impl ParallelFilterSettings {
         if !self.enabled {
             return None;
         }
-        // Torque and regressor lose the same content, so the filter adds no bias.
+        // The same filter acts on torque and regressor, so it adds no bias.
         let automatic = motion_cutoff_hz
             .map_or(1, |cutoff| (rate_hz / Self::rows_per_s(cutoff)).floor().clamp(1.0, 1000.0) as usize);
         let factor = self.factor.unwrap_or(automatic);
@@ -86,8 +86,8 @@ impl ParallelFilterSettings {
     }
 }
 
-/// Upper frequency of the motion, hertz. `None` for differentiators without a cut-off, and if only the deviation from a
-/// reference has one.
+/// Highest frequency of the motion, hertz. `None` for differentiators without a cut-off, and for those that filter only
+/// the deviation from a commanded motion.
 pub fn motion_band_hz(motion: &MotionSettings) -> Option<f64> {
     let differentiator = &motion.differentiator;
     differentiator.cutoff_hz().filter(|_| differentiator.reference().is_none())

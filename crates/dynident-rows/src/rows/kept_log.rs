@@ -3,10 +3,10 @@
 use super::row_store::RowStore;
 use dynident_recording::{ImportReport, MotionBlock};
 
-/// Maximum number of values that are kept of the motion of one log (256 MiB).
+/// Maximum number of stored values of the motion of one log (256 MiB).
 pub(super) const MAX_KEPT_VALUES: usize = 1 << 25;
 
-/// The motion of a log that was read once.
+/// Motion of a log in memory, so that the log is read only once.
 #[derive(Debug)]
 pub struct KeptLog {
     pub(super) blocks: Vec<MotionBlock>,
@@ -26,7 +26,7 @@ impl KeptLog {
     }
 }
 
-/// Stores blocks until they exceed the limit.
+/// Stores blocks of a motion until they exceed the memory limit.
 pub(super) struct BlockCache {
     pub(super) blocks: Option<Vec<MotionBlock>>,
     values: usize,
@@ -37,7 +37,7 @@ impl BlockCache {
         Self { blocks: is_enabled.then(Vec::new), values: 0 }
     }
 
-    /// Returns the block if it is not stored.
+    /// Stores the block, or returns it if it does not fit.
     pub(super) fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
         let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;
         // A mark takes an eighth of the memory of a value.

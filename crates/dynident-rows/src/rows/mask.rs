@@ -8,7 +8,7 @@ use dynident_recording::MotionBlock;
 #[derive(Debug)]
 pub struct RowMask<'a> {
     record: &'a MotionRecord,
-    /// Number of unusable samples before each sample.
+    /// For each sample, the number of unusable samples before it.
     unusable_before: Vec<usize>,
     half: usize,
     factor: usize,
@@ -19,8 +19,8 @@ pub struct RowMask<'a> {
 }
 
 impl<'a> RowMask<'a> {
-    /// Mask of a record's rows after a filter with half-length `half` and decimation `factor`; `None` if all rows are
-    /// valid.
+    /// Mask for the rows of a record after a filter that uses `half` samples on each side and decimates by `factor`;
+    /// `None` if all rows are valid.
     pub fn of(record: &'a MotionRecord, half: usize, factor: usize) -> Option<Self> {
         if record.usable.is_empty() && record.windows.is_none() {
             return None;

@@ -4,8 +4,9 @@ use core::ops::Range;
 use dynident_recording::MotionBlock;
 use std::borrow::Cow;
 
-/// Marks of invalid samples among `from .. from + samples` for the joint at `place`: invalid torque, and samples whose
-/// motion the differentiator extrapolated at an end of a piece. Empty if all are valid.
+/// For each sample of `from .. from + samples`, whether it is invalid for the joint at `place`. Invalid are samples
+/// with invalid torque, and samples at an end of a piece whose motion the differentiator extrapolated. Empty if all are
+/// valid.
 pub fn set_aside(block: &MotionBlock, place: usize, from: usize, samples: usize) -> Cow<'_, [bool]> {
     let first = place * block.rows + from;
     let marked = block.set_aside.get(first..first + samples).unwrap_or_default();
@@ -17,8 +18,8 @@ pub fn set_aside(block: &MotionBlock, place: usize, from: usize, samples: usize)
     Cow::Owned((0..samples).map(is_marked).collect())
 }
 
-/// Samples of a panel without the end effects of the differentiator, as indices in the panel of `samples` samples from
-/// sample `from` of the block.
+/// Samples of a panel that are free of end effects of the differentiator, as indices in the panel. The panel contains
+/// `samples` samples from sample `from` of the block.
 pub(super) fn settled(block: &MotionBlock, from: usize, samples: usize) -> Range<usize> {
     let [begin, end] = block.unsettled;
     let inside = begin..block.rows.saturating_sub(end);

@@ -1,8 +1,8 @@
 //! Filtered rows of regressor and torque, the input of all estimators and examinations.
 //!
-//! Samples flow in blocks: positions to motion, motion to regressor, regressor and torque through the same low-pass and
-//! decimation, then to a [`RowConsumer`]. The unfiltered regressor is never stored; filtered rows are stored if they
-//! fit.
+//! Samples are processed in blocks: positions are differentiated, the regressor is computed from the motion, and
+//! regressor and torque pass the same low-pass and decimation. A [`RowConsumer`] receives the resulting rows. The
+//! unfiltered regressor is never stored; filtered rows are stored if they fit into memory.
 
 mod builder;
 mod collector;
@@ -48,10 +48,11 @@ pub struct JointRows<'a> {
     pub joint: usize,
     /// Number of rows.
     pub rows: usize,
-    /// Column-major: the joint's columns of the layout with `rows` values each, then its torque (N m, N).
+    /// Column-major: the columns of the layout that belong to the joint with `rows` values each, then the torque of the
+    /// joint (N m, N).
     pub panel: &'a [f64],
-    /// For each row the share of the filter's weight on valid samples, by which the row was divided (at least one
-    /// half); empty if all samples are valid. [`counted`](Self::counted) drops rows with less than half.
+    /// For each row the share of the filter's weight on valid samples; empty if all samples are valid. The row was
+    /// divided by this share (by at least one half). [`counted`](Self::counted) drops rows with a share below one half.
     pub coverage: &'a [f64],
 }
 
@@ -64,7 +65,8 @@ pub struct RawSamples<'a> {
     pub rate_hz: f64,
     /// Time of the first sample, s after the first data row of the log.
     pub first_time_s: f64,
-    /// Samples on each side of a row that the filter uses: the first row of a segment is at this sample.
+    /// Number of samples before and after a row that the filter uses. The first row of a segment is at the sample with
+    /// this index.
     pub reach: usize,
     /// Regressor with the logged torque, smoothed if `smooth_torque` is set.
     pub panels: &'a Panels,
@@ -73,20 +75,20 @@ pub struct RawSamples<'a> {
     /// For each joint whether the torque of each sample is invalid (outlier, repeated value, bridged gap); empty if all
     /// are valid.
     pub set_aside: &'a [Vec<bool>],
-    /// Samples without the end effects of the differentiator.
+    /// Range of the samples that are free of end effects of the differentiator.
     pub settled: core::ops::Range<usize>,
 }
 
-/// Receives the rows of a log.
+/// Receives the rows of a log, for example to accumulate them in a triangular factor.
 pub trait RowConsumer {
-    /// Receives filtered rows. Joints of the same instants arrive in order, with the same number of rows unless windows
-    /// exclude some.
+    /// Receives filtered rows. For the same instants, the joints arrive in order. They have the same number of rows,
+    /// unless time windows exclude some.
     ///
     /// # Errors
     /// Any error stops the pass.
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError>;
 
-    /// Receives the samples before the filter, ahead of their rows. Ignored by default.
+    /// Receives unfiltered samples, before the filtered rows that are computed from them. By default they are ignored.
     ///
     /// # Errors
     /// Any error stops the pass.
@@ -95,20 +97,21 @@ pub trait RowConsumer {
         Ok(())
     }
 
-    /// Whether [`raw`](Self::raw) must be called; true by default. If not, a pass can reuse rows stored by an earlier
-    /// pass.
+    /// Whether [`raw`](Self::raw) must be called; true by default. If it is not needed, a pass can reuse the filtered
+    /// rows of an earlier pass.
     fn reads_samples(&self) -> bool {
         true
     }
 
-    /// One consumer per joint, if joints are independent and may be processed in parallel. `None` by default.
+    /// Separate consumers for the joints, if joints are independent and can be processed in parallel. `None` by
+    /// default.
     fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
         None
     }
 }
 
-/// Computes `panel · θ` of one joint, the torque that base parameters `theta` predict for its rows. `columns` are the
-/// joint's columns of the layout.
+/// Computes `panel · θ` for one joint: the torque that the base parameters `theta` predict for its rows. `columns` are
+/// the columns of the layout that belong to the joint.
 pub fn predicted_torque(panel: &[f64], rows: usize, columns: &[usize], theta: &[f64], out: &mut Vec<f64>) {
     out.clear();
     out.resize(rows, 0.0);

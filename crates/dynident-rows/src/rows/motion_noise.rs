@@ -1,4 +1,4 @@
-//! Effect of position noise on the rows.
+//! Effect of position noise on regressor rows.
 
 use super::builder::RowBuilder;
 use super::filter::motion_band_hz;
@@ -11,21 +11,21 @@ use dynident_model::sample::Random;
 use dynident_recording::{Derivatives, Differentiator, ImportReport, MotionBlock, Place};
 use rayon::prelude::*;
 
-/// Number of samples: enough for a noise power within about 10 %, in some milliseconds.
+/// Number of simulated samples: it gives the noise power within about 10 %, in some milliseconds.
 const NOISE_SAMPLES: usize = 4096;
 /// Maximum number of noise realisations for a short log.
 const MAX_REPEATS: usize = 8;
-/// Maximum length of a noise series, samples.
+/// Maximum length of a simulated noise sequence, samples.
 const MAX_SERIES_SAMPLES: usize = 1 << 16;
 const SEED: u64 = 0x6e6f_6973_6521;
 
-/// Computes the rows N that position noise adds for every joint: `N = W(m + n) − W(m)`, where m is the measured motion
-/// and n is position noise after the same differentiator, both after the parallel filter. `NᵀN` is the contribution of
-/// noise to `WᵀW`. The last column of N, the torque, is zero.
+/// Computes the rows N that position noise adds to the regressor W of every joint: `N = W(m + n) − W(m)`. Here m is the
+/// measured motion and n is simulated position noise, differentiated like the positions; both regressors are filtered
+/// by the parallel filter. `NᵀN` is the contribution of noise to `WᵀW`. The last column of N, the torque, is zero.
 ///
-/// n is white noise with the standard deviation that the importer found for each joint, with a fixed seed. m already
-/// contains noise, so products of two noisy velocities are overestimated by a factor of up to two. Long logs are
-/// sampled in pieces, short ones several times; the rows are weighted to represent `filtered_rows`.
+/// n is white noise with a fixed seed and the standard deviation that the importer found for each joint. m already
+/// contains noise, so the noise of products of two velocities is overestimated by a factor of up to two. Pieces of a
+/// long log are used; a short log is used several times. The rows are weighted to represent `filtered_rows` rows.
 ///
 /// `None` if the noise is unknown: for a prepared motion, and for differentiators that follow a commanded motion.
 ///
@@ -62,13 +62,13 @@ pub fn noise_factors(
     let mut random = Random::new(SEED);
     let noise = |_| Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples));
     let noise: Vec<Noise> = (0..repeats).map(noise).collect::<Result<_, _>>().map_err(in_filter)?;
-    // The same samples give the same panels in the same order, with and without noise.
+    // The panels with and without noise have the same samples in the same order.
     let rows = |block: &(dyn Fn(usize, &MotionBlock, usize) -> MotionBlock + Sync)| -> Result<JointPanels, LogError> {
         let (mut builder, mut panels) = (builder()?, JointPanels(vec![Vec::new(); model.dof()]));
         for repeat in 0..repeats {
             let mut from = 0;
             for piece in &pieces {
-                // Separate segments, so that filters restart.
+                // Each piece gets its own segment number, so that the filters restart.
                 let segment = piece.segment + repeat * pieces.len() + 1;
                 builder.take(&MotionBlock { segment, ..block(repeat, piece, from) }, &mut panels)?;
                 from += piece.rows;
@@ -107,7 +107,7 @@ impl Noise {
         position_noise: &[f64],
         (rate_hz, read, length): (f64, usize, usize),
     ) -> Result<Self, dynident_recording::FilterError> {
-        // A differentiator without a finite context needs a series as long as the log.
+        // A differentiator that uses all samples needs a noise sequence as long as the log.
         let (whole, margin) = match differentiator.context_samples(rate_hz) {
             Some(context) => (length + 2 * context, context),
             None => (read.clamp(length, MAX_SERIES_SAMPLES.max(length)), 0),
@@ -126,7 +126,7 @@ impl Noise {
         Ok(Self { length, derivatives })
     }
 
-    /// The piece with noise added; its first sample gets sample `from` of the noise.
+    /// The piece with noise added: its first sample gets sample `from` of the noise.
     fn on(&self, piece: &MotionBlock, from: usize) -> MotionBlock {
         let mut noisy = piece.clone();
         let [q, dq, ddq] = &self.derivatives;

@@ -11,15 +11,16 @@ const MAX_QUEUED_PANELS: usize = 4;
 
 enum MakerOutput<B> {
     Panels(SamplePanels),
-    /// A block whose panels were all sent before.
+    /// A block whose panels were all sent already.
     Block(B),
 }
 
 /// Runs a pass in two threads with the same order of work as one thread.
 ///
-/// A new thread takes blocks from `next`, which can reuse the memory of a returned block, and computes their panels
-/// with `make`, which returns the first sample of the next panel. A bounded queue limits memory. This thread passes
-/// each panel to `filter`, and each block after its last panel to `keep`, which returns blocks that it does not store.
+/// A new thread takes blocks from `next` and computes their panels with `make`. `next` can reuse the memory of a
+/// returned block; `make` returns the first sample of the next panel. A bounded queue limits the memory. The calling
+/// thread passes each panel to `filter`. After the last panel of a block, it passes the block to `keep`, which returns
+/// blocks that it does not store.
 pub(super) fn pipelined_panels<B: Borrow<MotionBlock> + Send>(
     mut next: impl FnMut(Option<B>) -> Result<Option<B>, LogError> + Send,
     mut make: impl FnMut(&MotionBlock, usize, &mut SamplePanels) -> Result<usize, LogError> + Send,
@@ -49,7 +50,7 @@ pub(super) fn pipelined_panels<B: Borrow<MotionBlock> + Send>(
         });
         let mut outcome = Ok(());
         for made in made {
-            // If the return channel is full, the memory is dropped.
+            // If the return channel is full, the memory of the block is released.
             match made {
                 MakerOutput::Panels(panels) => {
                     outcome = filter(&panels);
@@ -61,7 +62,7 @@ pub(super) fn pipelined_panels<B: Borrow<MotionBlock> + Send>(
                 break;
             }
         }
-        // The loop has dropped the receiver, so a blocked maker can finish.
+        // The receiver is dropped at the end of the loop, so a blocked sender can finish.
         match maker.join() {
             Ok(made) => outcome.and(made),
             Err(panic) => std::panic::resume_unwind(panic),

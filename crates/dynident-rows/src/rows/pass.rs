@@ -26,17 +26,17 @@ pub struct LogStatistics {
     pub report: Option<ImportReport>,
     /// Cut-off of the differentiator in use, hertz.
     pub motion_cutoff_hz: Option<f64>,
-    /// Rate after decimation, hertz.
+    /// Rate of the filtered rows, hertz.
     pub filtered_rate_hz: f64,
     /// Half-gain frequency of the parallel filter, hertz; `None` without a filter.
     pub filter_cutoff_hz: Option<f64>,
-    /// Filtered rows of each joint.
+    /// Number of filtered rows of each joint.
     pub filtered_rows: u64,
     /// Velocity histogram of each joint of the model.
     pub velocities: Vec<VelocityHistogram>,
 }
 
-/// Inputs of a pass over one recording, except the consumer.
+/// Inputs of a pass over one recording, except the receiver of its rows.
 #[derive(Clone, Copy)]
 pub struct LogPass<'a> {
     /// Recording to read.
@@ -47,15 +47,15 @@ pub struct LogPass<'a> {
     pub motion: &'a MotionSettings,
     /// Parallel filter.
     pub filter: &'a ParallelFilterSettings,
-    /// Cut-off that the parallel filter follows, hertz; `None` for that of the motion.
+    /// Cut-off from which the parallel filter is derived, hertz; `None` for the cut-off of the motion.
     pub torque_hz: Option<f64>,
-    /// Whether a second thread reads, and stored rows are sent to the joints' consumers in parallel.
+    /// Whether a second thread reads the log, and whether stored rows are sent to the joints' consumers in parallel.
     pub reader_thread: bool,
-    /// Approximate number of samples after which the pass ends.
+    /// Approximate number of samples after which the pass ends; `None` for all samples.
     pub most_samples: Option<u64>,
     /// Receives the number of samples read.
     pub progress: &'a dyn Progress,
-    /// Storage of the log's motion for later passes, if it fits.
+    /// Memory for the motion of the log, for later passes if it fits.
     pub kept: Option<&'a OnceLock<KeptLog>>,
 }
 
@@ -82,7 +82,7 @@ impl Motion<'_> {
 }
 
 impl LogPass<'_> {
-    /// Sends the recording's rows to `consumer`.
+    /// Reads the recording and sends its filtered rows to `consumer`.
     ///
     /// # Errors
     /// The recording cannot be read, lacks a temperature that friction needs, leaves the domain of a declared torque,
@@ -179,7 +179,7 @@ impl LogPass<'_> {
         })
     }
 
-    /// Whether this pass can use rows that other passes have filtered, and store its own.
+    /// Whether this pass can use filtered rows of earlier passes, and store its own rows.
     fn may_keep_rows(&self, filter: &DecimationSettings, consumer: &dyn RowConsumer) -> bool {
         !consumer.reads_samples()
             && self.most_samples.is_none()
@@ -187,7 +187,7 @@ impl LogPass<'_> {
             && filter.factor > 1
     }
 
-    /// Sends the rows of a stored log to `consumer` and filters only the columns that are not stored yet.
+    /// Sends the rows of a log in memory to `consumer`. Only columns that are not stored yet are filtered.
     fn kept_rows(
         &self,
         kept: &KeptLog,
@@ -216,9 +216,9 @@ impl LogPass<'_> {
         self.statistics(Some(kept.report.clone()), kept.rate_hz, Some(filter), rows.count(), needed, passed)
     }
 
-    /// Passes the motion to `take` block by block, without its regressor, until the end or until `most_samples`. Uses
-    /// the stored motion; otherwise reads the log and stores it if it fits. Returns the importer's report; `None` for a
-    /// prepared motion.
+    /// Passes the motion to `take` block by block, without computing the regressor, until the end or until
+    /// `most_samples`. Uses the motion in memory, if there is one; otherwise reads the log and stores its motion if it
+    /// fits. Returns the importer's report; `None` for a prepared motion.
     ///
     /// # Errors
     /// A log that cannot be read, and errors of `take`.
@@ -268,9 +268,10 @@ impl LogPass<'_> {
         }
     }
 
-    /// Selects pieces of the motion: about `samples` samples, in pieces of at most `piece` samples, each with a
-    /// separate segment number. The pieces are spread over a stored log; otherwise they come from its beginning. Empty
-    /// for a prepared motion. The second value is the number of samples from which the pieces were selected.
+    /// Selects about `samples` samples of the motion, in pieces of at most `piece` samples with a separate segment
+    /// number each. If the motion is in memory, the pieces are spread over the log; otherwise they are from its
+    /// beginning. Empty for a prepared motion. The second value is the number of samples from which the pieces were
+    /// selected.
     ///
     /// # Errors
     /// A log that cannot be read.
@@ -340,7 +341,7 @@ impl LogPass<'_> {
         Ok(())
     }
 
-    /// Sends the rows of blocks to `consumer`; a second thread gets the blocks and makes their panels.
+    /// Sends the rows of blocks to `consumer`. A second thread reads the blocks and computes their panels.
     fn beside<B: Borrow<MotionBlock> + Send>(
         &self,
         builder: &mut RowBuilder<'_>,
@@ -366,7 +367,7 @@ impl LogPass<'_> {
         self.most_samples.is_some_and(|most| builder.samples() >= most)
     }
 
-    /// Cache for the blocks of a log that is read completely and seems to fit.
+    /// Cache for the blocks of a log, if the log is read completely and will probably fit.
     fn block_cache(&self) -> BlockCache {
         let rows = self.recording.estimated_rows().unwrap_or(0) as usize;
         let seems_to_fit = rows.saturating_mul(4 * self.model.dof()) <= MAX_KEPT_VALUES;

@@ -2,8 +2,8 @@
 
 use dynident_estimation::factor::BLOCK_ROWS;
 
-/// Collects rows of a joint into blocks of [`BLOCK_ROWS`]. A factor absorbs a large block much faster than its parts,
-/// and the result does not depend on how the rows arrive.
+/// Collects rows of a joint into blocks of [`BLOCK_ROWS`]. A triangular factor absorbs a large block much faster than
+/// its parts, and the result does not depend on the sizes in which rows arrive.
 #[derive(Clone, Debug)]
 pub struct RowBlock {
     /// Column-major, with room for a whole block per column.
@@ -13,7 +13,7 @@ pub struct RowBlock {
 }
 
 impl RowBlock {
-    /// Empty block with this number of columns, torque included.
+    /// Empty block with this number of columns, including the torque.
     pub fn new(columns: usize) -> Self {
         Self { values: vec![0.0; columns * BLOCK_ROWS], columns, rows: 0 }
     }

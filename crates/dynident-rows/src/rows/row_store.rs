@@ -1,8 +1,8 @@
 //! Storage of filtered rows for later passes.
 //!
-//! Passes over one motion differ in few columns: friction with other constants, candidate terms, terms with another
-//! load. All other columns are identical, so they are stored, and a pass filters only the missing columns. The rows are
-//! bit-identical to those without storage.
+//! Passes over the same motion differ in few columns: friction with other constants, candidate terms, friction terms
+//! for another load. All other columns are identical, so they are stored, and a pass filters only the missing columns.
+//! The results are bit-identical to results without storage.
 
 use super::builder::RowBuilder;
 use super::collector::{CollectedJoint, Collector, MAX_STORED_VALUES};
@@ -18,15 +18,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 type Filtered = Arc<Vec<f64>>;
 
-/// Filters all columns of a model, or some of its terms, into a consumer.
+/// Filters the columns of a model, or only some of its terms, and sends the rows to a consumer.
 pub(super) type FilterPass<'p> =
     dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<PassStatistics, LogError> + 'p;
 
-/// Filtered rows of one log, by filter.
+/// Filtered rows of one log, one entry for each filter.
 #[derive(Debug, Default)]
 pub(super) struct RowStore(Mutex<Vec<Arc<FilteredRows>>>);
 
-/// Rows of one log after one filter, valid for any model of the same bodies.
+/// Rows of one log after one filter, valid for any model with the same bodies.
 #[derive(Clone, Debug)]
 pub(super) struct FilteredRows {
     filter: DecimationSettings,
@@ -42,18 +42,18 @@ pub(super) struct FilteredRows {
 struct FilteredJoint {
     columns: Vec<(Column, Filtered)>,
     torque: Filtered,
-    /// Coverage of the rows; 1 if all samples are valid.
+    /// Share of the filter's weight on valid samples, for each row; 1 if all samples are valid.
     coverage: Filtered,
 }
 
 impl RowStore {
-    /// Whether the filtered rows of `samples` samples fit.
+    /// Whether the filtered rows of `samples` samples fit into memory.
     pub(super) fn has_room(model: &RegressorModel, filter: &DecimationSettings, samples: usize) -> bool {
         let columns: usize = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len() + 2).sum();
         samples / filter.factor * columns <= MAX_STORED_VALUES
     }
 
-    /// Rows of `model` after `filter`: the stored columns, and the missing ones from `pass`.
+    /// Rows of `model` after `filter`. Missing columns are computed with `pass`.
     pub(super) fn rows(
         &self,
         model: &RegressorModel,
@@ -89,7 +89,7 @@ impl RowStore {
         self.put(FilteredRows::new(model, filter, made, passed).without_rarely_used(model));
     }
 
-    /// Replaces the rows of the same filter; drops the oldest other filters if there is no room.
+    /// Replaces the rows of the same filter. If there is no room, drops the oldest rows of other filters.
     fn put(&self, rows: FilteredRows) {
         let mut all = self.lock();
         all.retain(|kept| !kept.is_of(&rows.model, &rows.filter));
@@ -100,7 +100,7 @@ impl RowStore {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Arc<FilteredRows>>> {
-        // The content is consistent even if another thread panicked.
+        // The stored rows are valid even if another thread panicked.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -140,7 +140,7 @@ impl FilteredRows {
         self.filter == *filter && self.model == *model
     }
 
-    /// Terms of the model that are not stored, in order; `None` if a body is missing.
+    /// Terms of the model whose columns are not stored, in order; `None` if columns of a body are missing.
     fn missing_terms(&self, model: &RegressorModel) -> Option<Vec<Column>> {
         let layout = model.layout();
         let mut missing = vec![false; layout.columns().len()];
@@ -154,7 +154,7 @@ impl FilteredRows {
         missing.iter().all(|column| matches!(column, Column::Term(_))).then_some(missing)
     }
 
-    /// Adds terms, in the order of the collector.
+    /// Adds the columns of these terms, in the order of the collector.
     fn with_terms(&self, terms: &[Column], made: Collector) -> Self {
         let mut all = self.clone();
         for (joint, (kept, made)) in all.joints.iter_mut().zip(made.joints).enumerate() {
@@ -165,8 +165,8 @@ impl FilteredRows {
         all
     }
 
-    /// Drops columns that depend on a load, because the load changes with every fit. If the rest does not fit, drops
-    /// the columns that are not in this model.
+    /// Drops columns of load-dependent friction, because the load changes with every fit. If the rest does not fit,
+    /// also drops columns that this model does not use.
     fn without_rarely_used(&self, model: &RegressorModel) -> Self {
         let layout = model.layout();
         let mut without_rarely_used = self.clone();
@@ -198,8 +198,8 @@ impl FilteredRows {
         &self.velocities
     }
 
-    /// Sends the rows of the model to a consumer in the same pieces as a pass over samples; joints in parallel if
-    /// `beside` is set and the consumer supports it.
+    /// Sends the rows of the model to a consumer in the same pieces as a pass over samples. Joints are processed in
+    /// parallel if `beside` is set and the consumer supports this.
     pub(super) fn give(
         &self,
         model: &RegressorModel,
@@ -229,7 +229,7 @@ impl FilteredRows {
     }
 }
 
-/// Columns of a joint in the order of a model, torque last.
+/// Columns of a joint in the order of a model; the torque is the last column.
 struct JointPieces<'k> {
     joint: usize,
     columns: Vec<&'k [f64]>,

@@ -27,7 +27,7 @@ pub fn in_model_order(block: &MotionBlock, places: &[usize], from: usize, sample
 pub(super) struct PanelMaker<'a> {
     model: &'a RegressorModel,
     layout: Cow<'a, PanelLayout>,
-    /// Whether columns of bodies are computed; some terms do not need them.
+    /// Whether the columns of bodies are computed; some passes use only terms that do not need them.
     has_bodies: bool,
     places: Vec<usize>,
     workspace: BatchWorkspace,
@@ -52,7 +52,7 @@ pub(super) struct SamplePanels {
 }
 
 impl SamplePanels {
-    /// The samples before a filter with this reach.
+    /// Unfiltered samples, for a filter that uses `reach` samples on each side of a row.
     pub(super) fn as_raw(&self, reach: usize) -> RawSamples<'_> {
         RawSamples {
             segment: self.segment,
@@ -68,20 +68,20 @@ impl SamplePanels {
 }
 
 impl<'a> PanelMaker<'a> {
-    /// All columns of a model; joint `j` has index `places[j]` in the motion.
+    /// Computes all columns of a model; joint `j` has index `places[j]` in the motion.
     pub(super) fn new(model: &'a RegressorModel, places: &[usize]) -> Self {
         let (layout, load) = (Cow::Borrowed(model.layout()), model.load_parameters.clone());
         Self::of_layout(model, layout, true, load, places)
     }
 
-    /// Only some `terms` of the model, after the columns of the bodies if a term depends on the load.
+    /// Computes only some `terms` of the model, after the columns of the bodies if a term depends on the load.
     pub(super) fn of_terms(model: &'a RegressorModel, terms: &[Column], places: &[usize]) -> Self {
         let needs_load = terms.iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()));
         let known = model.layout().columns();
         let bodies = known.iter().filter(|column| needs_load && matches!(column, Column::Body { .. }));
         let columns: Vec<Column> = bodies.chain(terms).cloned().collect();
         let load = model.load_parameters.as_ref().filter(|_| needs_load).map(|parameters| {
-            // One value per column; those of terms are not read.
+            // One value per column; values of terms are not used.
             let of_column =
                 |column: &Column| known.iter().position(|known| known == column).map_or(0.0, |place| parameters[place]);
             columns.iter().map(of_column).collect()
@@ -128,7 +128,7 @@ impl<'a> PanelMaker<'a> {
         self.velocities
     }
 
-    /// Computes one panel of a block from sample `from`; returns the first sample of the next panel.
+    /// Computes one panel, which begins at sample `from` of the block; returns the first sample of the next panel.
     pub(super) fn make(&mut self, block: &MotionBlock, from: usize, out: &mut SamplePanels) -> usize {
         if block.segment != self.segment {
             self.segment = block.segment;

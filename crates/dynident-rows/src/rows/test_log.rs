@@ -24,7 +24,8 @@ impl TestLog {
         }
     }
 
-    /// A single-threaded pass over all samples, with rows above the motion's band.
+    /// A single-threaded pass over all samples. The parallel filter keeps torque above the frequency band of the
+    /// motion.
     pub(crate) fn pass<'p>(&'p self, model: &'p RegressorModel) -> LogPass<'p> {
         LogPass {
             recording: &self.recording,

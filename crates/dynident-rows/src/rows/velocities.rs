@@ -1,25 +1,26 @@
-//! Velocity histograms of joints, used to compare friction laws without the log.
+//! Velocity histograms of joints. They allow comparing friction laws without the log.
 
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of bins on each side of zero; the largest velocity is in the upper half of them.
+/// Maximum number of bins on each side of zero. The bin of the largest velocity is in the upper half of the bins.
 const MAX_BINS: usize = 128;
 
 /// Initial bin width, rad/s (m/s), smaller than any relevant velocity.
 const MIN_BIN_WIDTH_RAD_S: f64 = 1.0 / (1 << 20) as f64;
 
-/// Samples of a joint by velocity, in bins of equal width on each side of zero. The width is the smallest power of two
-/// with which 128 bins reach the largest velocity, so that the result does not depend on the order of samples.
+/// Number of samples of a joint by velocity, in bins of equal width on each side of zero. The bin width is the smallest
+/// power of two with which 128 bins cover the largest velocity, so that the result does not depend on the order of
+/// samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VelocityHistogram {
     /// Bin width, rad/s (m/s).
     pub width_rad_s: f64,
-    /// Samples with velocity zero.
+    /// Number of samples with velocity zero.
     pub resting: u64,
-    /// Samples with positive velocity: bin k contains `k width <= dq < (k + 1) width`.
+    /// Numbers of samples with positive velocity: bin k contains `k width <= dq < (k + 1) width`.
     pub forward: Vec<u64>,
-    /// Samples with negative velocity, mirrored.
+    /// Numbers of samples with negative velocity: bin k contains `k width <= -dq < (k + 1) width`.
     pub backward: Vec<u64>,
 }
 
@@ -56,8 +57,8 @@ impl VelocityHistogram {
         }
     }
 
-    /// Centre (rad/s, m/s) and sample count of every bin that is not empty. The bins next to zero are omitted: there
-    /// the joint sticks, and noise determines the sign of its velocity.
+    /// Centre (rad/s, m/s) and sample count of every non-empty bin, except the bins next to zero: there the joint
+    /// sticks, and noise determines the sign of its velocity.
     pub fn moving(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         let side = |counts: &'_ [u64], sign: f64| {
             let bins = counts.iter().enumerate().skip(1).filter(|(_, samples)| **samples > 0);

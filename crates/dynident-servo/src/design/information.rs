@@ -1,4 +1,4 @@
-//! Information of commands about the unknowns of a fit, from the simulated motion.
+//! Information of planned commands about the unknowns of a fit, from a simulation of the motion.
 
 use crate::fit::Search;
 use crate::normal::{add_gram, symmetric};
@@ -13,11 +13,12 @@ use nalgebra::DMatrix;
 pub(super) struct Simulated {
     /// Positions of each joint, rad (m).
     pub(super) positions: Vec<Vec<f64>>,
-    /// `Σ g gᵀ / (σ² c)` over samples and joints, with the derivatives `g` of the positions by the coordinates.
+    /// Information matrix `Σ g gᵀ / (σ² c)` over samples and joints: g is the derivative of a position by the unknowns,
+    /// σ the standard deviation of its error, c the number of samples with correlated errors.
     pub(super) information: DMatrix<f64>,
 }
 
-/// Simulates `commands` at `rate_hz` from rest at `start`. `None` if the simulation does not give numbers.
+/// Simulates `commands` at `rate_hz`, starting at rest in `start`. `None` if the simulation diverges.
 pub(super) fn simulated(
     varied: &VariedRobot,
     start: &[f64],
@@ -37,7 +38,7 @@ pub(super) fn simulated(
     (ended && sums.iter().all(|sum| sum.is_finite())).then_some(Simulated { positions, information })
 }
 
-/// The commands as a run that begins at rest at `start`.
+/// A run with these commands, which begins at rest in `start`.
 fn run_of(start: &[f64], commands: &[Vec<f64>], rate_hz: f64) -> Run {
     let samples = commands.first().map_or(0, Vec::len);
     Run {
@@ -56,7 +57,7 @@ pub(super) fn log_det(matrix: &DMatrix<f64>) -> Option<f64> {
     Some(2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>())
 }
 
-/// The end of a fit to a log with this information, at the values of the robot.
+/// Expected result of a fit to a log with this information, if the values of the robot are correct.
 pub(super) fn forecast(information: &DMatrix<f64>, prior: &DMatrix<f64>) -> Option<Search> {
     let covariance = (information + prior).cholesky()?.inverse();
     Some(Search {

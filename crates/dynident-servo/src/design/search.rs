@@ -1,4 +1,4 @@
-//! The sequence of segments with the most information, and the chirp that it is compared with.
+//! Search for the sequence of segments with the most information, and the chirp that it is compared with.
 
 use super::information::{Simulated, forecast, log_det, simulated};
 use super::segment::{CommandRange, SegmentClock, random_segment, sweep};
@@ -12,47 +12,49 @@ use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// The search simulates with steps this many times longer than the fit.
+/// Ratio of the time step in the search to that of the fit.
 const COARSE: f64 = 4.0;
-/// Factor of the size after a batch without a permitted candidate.
+/// Factor on the amplitudes after a batch without a permitted candidate.
 const SMALLER: f64 = 0.6;
-/// Batches for one segment, and attempts for the chirp, before the search ends.
+/// Number of batches for one segment, and of attempts for the chirp, after which the search ends.
 const ATTEMPTS: usize = 8;
 /// Lowest frequency of the chirp, Hz.
 const CHIRP_FROM_HZ: f64 = 0.1;
-/// Amplitude of the chirp as a part of half of the joint's range.
+/// Amplitude of the chirp, relative to half of the joint's range.
 const CHIRP_AMPLITUDE: f64 = 0.5;
-/// Least improvement of the criterion by an exchange.
+/// Minimum improvement of the criterion by an exchange of a segment.
 const LEAST_GAIN: f64 = 1e-6;
 
-/// Returns whether simulated positions of each joint, at the rate of the commands, are permitted.
+/// Function that returns whether a simulated motion is permitted. Argument: positions of each joint at the rate of the
+/// commands.
 pub type MotionCheck<'a> = &'a dyn Fn(&[Vec<f64>]) -> bool;
 
-/// Expected result of a fit to commands.
+/// Expected result of a fit to planned commands.
 #[derive(Clone, Debug)]
 pub struct Forecast {
-    /// Values with their standard deviations.
+    /// Values of drives and bodies with their expected standard deviations.
     pub values: Vec<ServoValue>,
-    /// The scale that all torques, inertias and masses share.
+    /// The common factor of all torques, inertias and masses.
     pub scale: Scale,
-    /// `log det` of information and priors.
+    /// Logarithm of the determinant of the information matrix, including priors.
     pub log_det: f64,
 }
 
-/// Designed commands.
+/// Result of a design of commands.
 #[derive(Clone, Debug)]
 pub struct DesignedCommands {
     /// Times, s.
     pub times_s: Vec<f64>,
-    /// Commands of each joint, rad (m), each held until the next.
+    /// Commands of each joint, rad (m); each command is held until the next.
     pub commands: Vec<Vec<f64>>,
     /// Simulated positions of each joint, rad (m).
     pub positions: Vec<Vec<f64>>,
     /// Whether the whole motion is permitted.
     pub is_permitted: bool,
-    /// Expected result of the commands.
+    /// Expected result of a fit to the designed commands.
     pub forecast: Forecast,
-    /// Expected result of a chirp of all joints with the same length, range, speed and highest frequency.
+    /// Expected result of a fit to a chirp of all joints with the same length, range, speed and highest frequency, for
+    /// comparison.
     pub chirp: Forecast,
     /// Number of simulated candidates.
     pub evaluations: usize,
@@ -71,13 +73,14 @@ struct Designer<'a> {
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
-/// A chosen segment.
+/// A selected segment.
 struct Chosen {
     commands: Vec<Vec<f64>>,
     simulated: Simulated,
 }
 
-/// Designs commands from rest at `start` and back. `advance` receives the number of finished candidates.
+/// Designs commands for a motion that starts at rest in `start` and returns to it. `advance` receives the number of
+/// finished candidates.
 ///
 /// # Errors
 /// Invalid settings; a robot whose simulation fails; no permitted motion.
@@ -119,7 +122,8 @@ impl Designer<'_> {
         ServoError::NoMotion { attempts: ATTEMPTS * self.settings.candidates }
     }
 
-    /// Candidates between `ends`, each simulated, with the criterion for `others` plus its information; the best first.
+    /// Simulates random candidates between the postures `ends` and sorts them by the criterion for the information of
+    /// `others` and of the candidate, the best first.
     fn batch(
         &self,
         others: &DMatrix<f64>,
@@ -141,12 +145,12 @@ impl Designer<'_> {
                 Some((log_det(&(others + &simulated.information))?, Chosen { commands, simulated }))
             })
             .collect();
-        // Stable, so that equal candidates keep their order.
+        // A stable sort, so that equal candidates keep their order.
         found.sort_by(|(one, _), (other, _)| other.total_cmp(one));
         found
     }
 
-    /// The best permitted candidate with a criterion above `above`, simulated with the step of the fit.
+    /// The best permitted candidate whose criterion exceeds `above`, simulated with the time step of the fit.
     fn best(&self, batch: Vec<(f64, Chosen)>, above: f64, from: &[f64]) -> Option<Chosen> {
         let better = batch.into_iter().take_while(|(criterion, _)| *criterion > above);
         let mut permitted = better.filter(|(_, chosen)| (self.is_permitted)(&chosen.simulated.positions));
@@ -177,7 +181,7 @@ impl Designer<'_> {
         Ok(chosen)
     }
 
-    /// Compares each segment with new candidates between the same ends.
+    /// Compares each segment with new candidates between the same end postures, and replaces it by a better one.
     fn exchange(&self, chosen: &mut [Chosen], start: &[f64], random: &mut Random) {
         let mut total = chosen.iter().fold(self.prior.clone(), |sum, own| sum + &own.simulated.information);
         for at in 0..chosen.len() {
@@ -196,7 +200,7 @@ impl Designer<'_> {
         }
     }
 
-    /// Simulates the whole sequence with the step of the fit.
+    /// Simulates the complete sequence with the time step of the fit.
     fn finish(&self, chosen: &[Chosen], start: &[f64], chirp: Forecast) -> Result<DesignedCommands, ServoError> {
         let joined = |joint: usize| chosen.iter().flat_map(|own| own.commands[joint].iter().copied()).collect();
         let commands: Vec<Vec<f64>> = (0..start.len()).map(joined).collect();
@@ -224,7 +228,7 @@ impl Designer<'_> {
         Ok(Forecast { values, scale, log_det })
     }
 
-    /// Forecast of a chirp of all joints around `start`, with the largest permitted amplitude.
+    /// Expected result for a chirp of all joints around `start`, with the largest permitted amplitude.
     fn chirp(&self, start: &[f64]) -> Result<Forecast, ServoError> {
         let samples = self.clock.samples * self.settings.segments();
         let duration_s = samples as f64 / self.settings.rate_hz;
@@ -233,7 +237,7 @@ impl Designer<'_> {
             let of_joint = |joint: usize| {
                 let range = &self.ranges[joint];
                 let amplitude = size * CHIRP_AMPLITUDE * 0.5 * (range.greatest - range.least);
-                // Joints with one frequency would move together.
+                // Joints with the same frequency would move in proportion, which separates their parameters badly.
                 let from_hz = CHIRP_FROM_HZ * (1.0 + 0.15 * joint as f64);
                 let at = |sample: usize| {
                     let t = sample as f64 / self.settings.rate_hz;

@@ -1,27 +1,28 @@
-//! Random commands of one segment. Rests, reversals, steps and sines separate friction, stiffness, damping, delay and
-//! weight.
+//! Random commands of one segment: rests, reversals, steps and sines, which together separate friction, stiffness,
+//! damping, delay and weight.
 
 use dynident_model::sample::Random;
 
-/// Part of a segment for the way from its beginning to the centre of its motion, and for the way to its end.
+/// Share of a segment's duration for the transition to the centre of its motion, and again for the transition to its
+/// end.
 const WAY: f64 = 0.15;
-/// Part of a segment at rest at its end, so that the next begins at rest.
+/// Share of a segment's duration at rest at its end, so that the next segment begins at rest.
 const REST: f64 = 0.08;
-/// Amplitudes, as parts of half of the joint's range.
+/// Smallest and largest amplitude, relative to half of the joint's range.
 const AMPLITUDES: [f64; 2] = [0.08, 0.6];
 /// Lowest frequency of a sweep, Hz.
 const LOWEST_HZ: f64 = 0.3;
-/// Shortest and longest time at a level of steps, s.
+/// Shortest and longest time at one level of a sequence of steps, s.
 const LEVEL_S: [f64; 2] = [0.35, 1.2];
-/// Part of the speed limit that commands use: the servo overshoots.
+/// Share of the speed limit that the commands use, because the servo overshoots.
 const SPEED_PART: f64 = 0.7;
 
-/// Range and speed of one joint's commands.
+/// Permitted range and speed of one joint's commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandRange {
-    /// Least position, rad (m).
+    /// Smallest position, rad (m).
     pub least: f64,
-    /// Greatest position, rad (m).
+    /// Largest position, rad (m).
     pub greatest: f64,
     /// Highest speed, rad/s (m/s).
     pub speed: f64,
@@ -33,7 +34,7 @@ impl CommandRange {
     }
 }
 
-/// The clock of a segment.
+/// Number of samples, sample rate and highest frequency of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SegmentClock {
     pub(super) samples: usize,
@@ -41,15 +42,16 @@ pub(super) struct SegmentClock {
     pub(super) highest_hz: f64,
 }
 
-/// Motion of one joint around the centre of a segment, from -1 to 1.
+/// Shape of one joint's motion around the centre of a segment, with values from -1 to 1.
 enum Shape {
-    /// Rest, while other joints move.
+    /// The joint rests while other joints move.
     Still,
-    /// Slow back-and-forth motion at constant speed: friction in both directions.
+    /// Slow back-and-forth motion at constant speed, for friction in both directions.
     Reversals { cycles: f64 },
-    /// Steps between levels with rests, each level from both sides: friction at rest, stiffness, step responses.
+    /// Steps between levels with rests, each level reached from both sides, for friction at rest, stiffness and step
+    /// responses.
     Levels { ends_s: Vec<f64>, levels: Vec<f64> },
-    /// A sine with rising or falling frequency: damping, armature, delay.
+    /// A sine with rising or falling frequency, for damping, armature and delay.
     Sweep { from_hz: f64, to_hz: f64 },
 }
 
@@ -81,7 +83,8 @@ impl Shape {
         }
     }
 
-    /// Position at `t` of `duration_s`, with an amplitude that keeps the speed: for steps, the servo limits it.
+    /// Position at time `t` of the shape, which lasts `duration_s`. The amplitude is reduced where the motion would
+    /// exceed `speed`. For steps it is not, because the servo limits the speed.
     fn at(&self, t: f64, duration_s: f64, amplitude: f64, speed: f64) -> f64 {
         match self {
             Self::Still => 0.0,
@@ -99,7 +102,7 @@ impl Shape {
     }
 }
 
-/// A sine whose frequency changes exponentially from the first to the second, with soft ends. Its amplitude is reduced
+/// A sine whose frequency changes exponentially from `from_hz` to `to_hz`, with smooth ends. The amplitude is reduced
 /// where the sine would exceed `speed` (rad/s or m/s).
 pub(super) fn sweep(t: f64, duration_s: f64, [from_hz, to_hz]: [f64; 2], [amplitude, speed]: [f64; 2]) -> f64 {
     use core::f64::consts::TAU;
@@ -111,14 +114,14 @@ pub(super) fn sweep(t: f64, duration_s: f64, [from_hz, to_hz]: [f64; 2], [amplit
     amplitude.min(speed / (TAU * hz)) * soft * (TAU * cycles).sin()
 }
 
-/// A way with zero velocity at both ends, from 0 to 1.
+/// Smooth transition from 0 to 1 with zero velocity at both ends.
 fn smooth(part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
     part * part * (3.0 - 2.0 * part)
 }
 
-/// Random commands of all joints from `start` to `end`, or to a random end. `size` scales the distances from `start`
-/// and all amplitudes: 1 uses the whole range.
+/// Random commands of all joints from the posture `start` to `end`, or to a random posture. `size` scales all
+/// amplitudes and the distances from `start`; with 1 the whole range is used.
 pub(super) fn random_segment(
     ranges: &[CommandRange],
     (start, end): (&[f64], Option<&[f64]>),

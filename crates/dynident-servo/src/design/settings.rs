@@ -14,16 +14,17 @@ pub struct ServoDesignSettings {
     pub rate_hz: f64,
     /// Duration of one segment, s. Default 6: slow reversals and sweeps need some seconds.
     pub segment_s: f64,
-    /// Highest frequency of a sweep, Hz. Default 5: delay and damping are separated by motion up to 2 to 5 Hz.
+    /// Highest frequency of a sweep, Hz. Default 5: motion up to 2 to 5 Hz is necessary to separate delay and damping.
     pub highest_hz: f64,
     /// Random candidates for each segment. Default 40.
     pub candidates: usize,
-    /// How often each segment is compared with new candidates after the first choice. Default 2.
+    /// Number of times that each segment is compared with new candidates after the first selection. Default 2.
     pub exchanges: usize,
-    /// Expected standard deviation of the simulation's error, rad (m). Default 0.005: the model of an SO-101 leaves 3
-    /// to 9 mrad for each joint.
+    /// Expected standard deviation of the difference between simulated and measured position, rad (m). Default 0.005:
+    /// for an SO-101, it is 3 to 9 mrad for each joint after a fit.
     pub error: f64,
-    /// Time in which these errors are alike, s. Default 0.5, the half second with which a fit begins.
+    /// Time over which these differences are correlated, s. Default 0.5, the value with which a fit begins (25 samples
+    /// at 50 Hz).
     pub correlation_s: f64,
     /// Seed of the random candidates. Default 1.
     pub seed: u64,
@@ -45,15 +46,15 @@ impl Default for ServoDesignSettings {
     }
 }
 
-/// Least duration of a segment, s: the ways to its centre and back need a part of it.
+/// Minimum duration of a segment, s: the transitions to its centre and to its end need a part of it.
 const LEAST_SEGMENT_S: f64 = 2.0;
-/// Longest commands, s: a search simulates them hundreds of times.
+/// Maximum duration of the commands, s: a search simulates them hundreds of times.
 const LONGEST_S: f64 = 3600.0;
 /// Range of the rate, Hz.
 const RATES_HZ: [f64; 2] = [10.0, 1000.0];
-/// Most candidates and exchanges.
+/// Maximum number of candidates, and of exchanges.
 const MOST: usize = 10_000;
-/// Samples of the highest period: a sine with fewer is a sequence of steps.
+/// Minimum number of samples in a period of the highest frequency: with fewer, a sine becomes a sequence of steps.
 const LEAST_SAMPLES_OF_PERIOD: f64 = 5.0;
 
 impl ServoDesignSettings {
@@ -78,7 +79,7 @@ impl ServoDesignSettings {
         }
     }
 
-    /// Number of candidates that a design simulates; batches without a permitted candidate are repeated.
+    /// Number of candidates that a design simulates, without repeated batches.
     pub fn evaluations(&self) -> usize {
         self.segments() * self.candidates * (1 + self.exchanges)
     }
@@ -93,7 +94,7 @@ impl ServoDesignSettings {
         (self.duration_s * self.rate_hz / self.segments() as f64).round().max(1.0) as usize
     }
 
-    /// Information of one sample, 1/rad² (1/m²).
+    /// Weight of one sample in the information matrix, 1/rad² (1/m²).
     pub(super) fn weight(&self) -> f64 {
         1.0 / (self.error.powi(2) * (self.correlation_s * self.rate_hz).max(1.0))
     }

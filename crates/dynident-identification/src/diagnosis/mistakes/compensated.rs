@@ -1,12 +1,12 @@
-//! Torque without the gravity torque of the nominal bodies.
+//! Mistake: the logged torque lacks the gravity torque of the nominal bodies.
 
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
 use crate::diagnosis::motion_rows::MotionRows;
 use crate::diagnosis::nominal::gravity_torque;
 use dynident_dynamics::ParametricModel;
 
-/// The torques lack the gravity torque of the nominal bodies: the controller logs only the torque in addition to its
-/// gravity compensation.
+/// The controller logs only the torque in addition to its gravity compensation, so the torques lack the gravity torque
+/// of the nominal bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensated;
 

@@ -1,10 +1,10 @@
-//! A Denavit-Hartenberg table in the other convention.
+//! Mistake: a Denavit-Hartenberg table with the wrong convention.
 
 use super::kind::{Breadth, Facts, MistakeKind, Setup};
 use dynident_dynamics::ParametricModel;
 use dynident_model::DhConvention;
 
-/// The description is a Denavit-Hartenberg table that states the wrong convention.
+/// The robot description is a Denavit-Hartenberg table that states the wrong convention.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Convention {
     /// The correct convention.
@@ -17,7 +17,8 @@ impl MistakeKind for Convention {
         setup.model().other_convention().map(|(convention, _)| Self { convention }).into_iter().collect()
     }
 
-    /// The table gives each body in its own frame, so the nominal values are those of the corrected model.
+    /// The robot with the other convention. The table describes each body in its own frame, so the nominal values of
+    /// the corrected model are used.
     fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
         let (_, meant) = robot.model().other_convention().filter(|(other, _)| *other == self.convention)?;
         ParametricModel::new(meant.clone(), robot.terms().to_vec()).ok()

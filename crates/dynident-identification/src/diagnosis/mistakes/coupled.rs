@@ -1,4 +1,4 @@
-//! A column that moves with a neighbouring joint.
+//! Mistake: a column that also moves with a neighbouring joint.
 
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
 use super::study_keys::{KeyChange, StudyKeys, list};
@@ -7,17 +7,18 @@ use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::log::ChannelGroup;
 
-/// The column of a joint also moves with another joint: it contains `q_joint + sign q_with`, as for the motor of a
-/// parallelogram or of a coupled wrist. For torques of the motor, `τ_with` lacks `sign τ_joint`.
+/// The position column of a joint also moves with another joint: it contains `q_joint + sign q_with`, as at the motor
+/// of a parallelogram or of a coupled wrist. If torques are measured at the motors, the column of `τ_with` lacks
+/// `sign τ_joint`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupled {
     /// The joint.
     pub joint: usize,
-    /// The joint that its column also moves with.
+    /// The other joint with which the column of `joint` moves.
     pub with: usize,
-    /// 1 or -1.
+    /// Direction of the coupling, 1 or -1.
     pub sign: f64,
-    /// Positions, or positions and torques.
+    /// Whether only positions are coupled, or positions and torques.
     pub channels: Channels,
 }
 
@@ -68,7 +69,8 @@ impl MistakeKind for Coupled {
         )
     }
 
-    /// The matrix that removes the other joint from the position, or adds the torque to that of the other joint.
+    /// The matrix for the study that removes the other joint from the position, or adds the torque to the torque of the
+    /// other joint.
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         let [joint, with] = [self.joint, self.with].map(|joint| keys.places[joint]);
         let of = |channels: Channels| {

@@ -1,4 +1,4 @@
-//! A wrong gravity vector: mounting, unit, compensation.
+//! Mistake: a wrong gravity vector because of mounting, unit or compensation.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, with_model};
@@ -9,19 +9,20 @@ use dynident_model::Vec3;
 
 /// Default gravity of a study, m/s².
 const EARTH_M_S2: f64 = 9.81;
-/// Largest relative difference from earth's gravity by place and by rounding.
+/// Maximum relative difference from earth's gravity that location and rounding cause.
 const MAX_EARTH_DIFFERENCE: f64 = 0.03;
 
-/// Another gravity vector: the base is mounted in another orientation, or the torque is without gravity (zero).
+/// Another gravity vector: the base is mounted in another orientation, or the torque does not contain gravity (zero
+/// vector).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gravity {
-    /// Acceleration in the frame of the base, m/s².
+    /// Gravity vector in the frame of the base, m/s².
     pub gravity_m_s2: [f64; 3],
 }
 
 impl MistakeKind for Gravity {
-    /// The same gravity in other directions. Rarer: another unit, no gravity (compensated by the controller), and
-    /// earth's gravity for a study without gravity.
+    /// Candidates: the same gravity in other directions. Rarer candidates: another unit, no gravity (compensated by the
+    /// controller), and earth's gravity for a study without gravity.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let gravity = setup.model().gravity();
         let size = gravity.norm();
@@ -74,7 +75,8 @@ impl MistakeKind for Gravity {
         Some(Self { gravity_m_s2: [0.0; 3] }.into())
     }
 
-    /// Turns the vector about two perpendicular axes, first by up to 0.5 rad, then by up to 0.1 rad.
+    /// Rotates the vector about two perpendicular axes, first by up to 0.5 rad, then by up to 0.1 rad, to the smallest
+    /// `value`.
     fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let mut gravity = self.gravity_m_s2;
         if gravity == [0.0; 3] {
@@ -101,7 +103,7 @@ fn directions() -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// Two unit vectors perpendicular to `v` and to each other.
+/// Two unit vectors that are perpendicular to `v` and to each other.
 fn perpendicular_axes(v: [f64; 3]) -> [[f64; 3]; 2] {
     let least = (0..3).min_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs())).unwrap_or(0);
     let mut other = [0.0; 3];
@@ -110,7 +112,7 @@ fn perpendicular_axes(v: [f64; 3]) -> [[f64; 3]; 2] {
     [first, unit(cross(v, first))]
 }
 
-/// `v` turned by `angle` rad about the perpendicular unit vector `axis`.
+/// The vector `v`, rotated by `angle` (rad) about the unit vector `axis` perpendicular to it.
 fn turned(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
     let side = cross(axis, v);
     core::array::from_fn(|k| v[k] * angle.cos() + side[k] * angle.sin())

@@ -1,4 +1,4 @@
-//! The properties that each kind of mistake defines.
+//! Interface that each kind of mistake implements.
 
 use super::Mistake;
 use super::numbers::Number;
@@ -9,14 +9,15 @@ use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_model::Model;
 
-/// Groups of candidates.
+/// Groups of candidate mistakes, by frequency.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) enum Breadth<'a> {
-    /// Common mistakes. The only free numbers are zeros and mountings.
+    /// Common mistakes. Their only free numbers are zero positions and mounting orientations.
     Usual,
-    /// Rarer mistakes: units of single joints, other rates, coupled columns, the magnitude of gravity.
+    /// Rarer mistakes: units of single joints, other sample rates, coupled columns, the magnitude of gravity.
     Rare,
-    /// Further mistakes of a log with known base parameters; contains their predicted torque of each joint.
+    /// Further mistakes for a log with known base parameters; contains the torque of each joint that these parameters
+    /// predict.
     KnownRobot(&'a [Vec<f64>]),
 }
 
@@ -32,36 +33,41 @@ impl Setup<'_> {
         self.robot.model()
     }
 
-    /// Numbers of the revolute joints.
+    /// Indices of the revolute joints.
     pub(super) fn turning(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.robot.dof()).filter(|&joint| self.model().joints()[joint].is_rotary())
     }
 }
 
-/// The evidence that has to improve before a correction is accepted, in addition to the score of all joints.
+/// Evidence that must improve, in addition to the score of all joints, before a correction is accepted.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::diagnosis) enum Proof {
     #[default]
     Score,
-    /// This joint must have a small residual: a dead or noisy channel fits equally well in any unit.
+    /// This joint must have a small residual. (A dead or noisy channel fits equally well in any unit.)
     Joint(usize),
-    /// The same for a mistake that is tried only where the joint travels far beyond its range.
+    /// This joint must have a small residual. For a mistake that is only tried if the joint travels far beyond its
+    /// range.
     Travel(usize),
-    /// This joint must have a small and clearly improved residual: another gain may only compensate for other joints.
+    /// This joint must have a small and clearly improved residual. (A wrong gain may otherwise only compensate for
+    /// other joints.)
     JointGain(usize),
-    /// The score without limits: any offset brings a joint back between its stops, which may be wrong.
+    /// The score without joint limits must improve. (An offset can always move a joint back between its limits, and
+    /// these limits may be wrong.)
     Torque,
-    /// The free fit: another length must not only make the bodies consistent.
+    /// The residual of the unconstrained fit must improve. (Another length must not only make the bodies physically
+    /// consistent.)
     BaseParameters,
-    /// The consistent fit: nominal bodies that are too heavy do not influence it.
+    /// The residual of the physically consistent fit must improve. (Nominal bodies that are too heavy do not influence
+    /// it.)
     ConsistentRobot,
 }
 
-/// The torque column of a joint after a correction.
+/// Source of a joint's torque column after a correction.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) struct TorqueSource {
     pub(in crate::diagnosis) joint: usize,
-    /// The joint that the column belongs to now.
+    /// The joint to which the column belongs in the study.
     pub(in crate::diagnosis) from: usize,
     pub(in crate::diagnosis) factor: f64,
 }
@@ -70,33 +76,33 @@ pub(in crate::diagnosis) struct TorqueSource {
 pub(in crate::diagnosis) struct Facts {
     /// `kind` of the finding in the JSON of `check`.
     pub(in crate::diagnosis) key: &'static str,
-    /// Cost in units of the score: a penalty for rare mistakes and for free numbers.
+    /// Cost of the mistake in units of the score: a penalty for rare mistakes and for free numbers.
     pub(in crate::diagnosis) rarity: f64,
-    /// The channels, if the same mistake is possible in other channels.
+    /// The affected channels, if the same mistake is possible in other channels.
     pub(in crate::diagnosis) channels: Option<Channels>,
-    /// The joints that it concerns; `None` for all.
+    /// The affected joints; `None` for all.
     pub(in crate::diagnosis) joints: Option<Vec<usize>>,
     pub(in crate::diagnosis) torques: Vec<TorqueSource>,
-    /// Whether the correction adds to torques, which alone reduces unexplained shares.
+    /// Whether the correction adds columns to torques, which alone reduces unexplained shares.
     pub(in crate::diagnosis) adds_torques: bool,
     pub(in crate::diagnosis) torque_gain: Option<usize>,
-    /// The factor of the joints' positions. Another unit needs another width of the friction step.
+    /// Factor on the positions of the affected joints. In another unit, the smoothed friction sign needs another width.
     pub(in crate::diagnosis) position_factor: Option<f64>,
-    /// Whether it is another rate of the recorder, not another unit of time.
+    /// Whether the mistake is another rate of the recorder, not another unit of time.
     pub(in crate::diagnosis) is_other_rate: bool,
-    /// Whether all logs have it, since they have the same robot at the same place.
+    /// Whether the mistake must be present in all logs, because it concerns the robot or its mounting.
     pub(in crate::diagnosis) is_of_all_logs: bool,
-    /// The channels that are reported first, if logs seldom distinguish the same mistake in other channels.
+    /// Channels that are reported first, because logs seldom distinguish the same mistake in other channels.
     pub(in crate::diagnosis) likelier_channels: Option<Channels>,
     pub(in crate::diagnosis) proof: Proof,
-    /// Its free number; `None` for a fixed unit or without a number.
+    /// Free number of the mistake; `None` for a fixed unit or a mistake without a number.
     pub(in crate::diagnosis) number: Option<Number>,
-    /// Numbers that a search could find for another robot.
+    /// Numbers of the mistake that a search could find for another robot.
     pub(in crate::diagnosis) other_numbers: Vec<f64>,
 }
 
 impl Facts {
-    /// A common mistake of all joints without a number.
+    /// Properties of a common mistake of all joints without a number.
     pub(super) fn of(key: &'static str) -> Self {
         Self { key, ..Self::default() }
     }
@@ -131,7 +137,7 @@ pub(super) trait MistakeKind {
         None
     }
 
-    /// The mistake with a standard number, for comparison; `None` for a kind without a number.
+    /// The mistake with a standard number, for the comparison of kinds; `None` for a kind without a number.
     fn subject(&self) -> Option<Mistake> {
         self.with_number(1.0)
     }
@@ -147,7 +153,7 @@ pub(super) trait MistakeKind {
     }
 }
 
-/// The robot with another model; nominal values are kept if present.
+/// The robot with another model; nominal values are kept if there are any.
 pub(super) fn with_model(robot: &ParametricModel, model: Model) -> Option<ParametricModel> {
     let again = ParametricModel::new(model, robot.terms().to_vec()).ok()?;
     if robot.nominal_base().is_none() { Some(again) } else { again.with_nominal(robot.nominal().to_vec()).ok() }

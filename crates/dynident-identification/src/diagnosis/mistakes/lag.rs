@@ -1,19 +1,19 @@
-//! A channel that was logged too late or too early.
+//! Mistake: a channel that was logged too late or too early.
 
 use super::kind::{Breadth, Facts, MistakeKind, Setup, joint_list};
 use super::study_keys::{KeyChange, StudyKeys, at, list, number};
 use crate::diagnosis::channels::Channels;
 
-/// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than the other
-/// channels, by more than the lag that a fit compensates. Each lag has different instants (`lag_search`), so lags are
-/// not among the candidates and rows are not corrected.
+/// The torques of these joints, or the position of one joint, were logged later than the other channels (earlier, if
+/// the lag is negative), by more than the lag that a fit compensates. The compared instants depend on the lag
+/// (`lag_search`), so lags are not among the candidates of the search, and this correction does not change rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lag {
     /// The joints.
     pub joints: Vec<usize>,
     /// Torques or positions, never both.
     pub channels: Channels,
-    /// The total lag, s; for torques it includes a stated or compensated lag.
+    /// Total lag, s; for torques it includes a stated or compensated lag.
     pub lag_s: f64,
 }
 
@@ -37,7 +37,7 @@ impl MistakeKind for Lag {
         )
     }
 
-    /// The key applies to all logs and only to torques.
+    /// Key that corrects the lag; it exists only for torques and applies to all logs.
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         if self.channels != Channels::Torque || !keys.is_common() {
             return Vec::new();

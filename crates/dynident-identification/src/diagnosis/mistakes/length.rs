@@ -1,24 +1,26 @@
-//! A wrong distance between a joint and the joint before it.
+//! Mistake: a wrong distance between a joint and the previous joint.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, with_model};
 use super::numbers::Number;
 use dynident_dynamics::ParametricModel;
 
-/// Tried factors: a radius for a diameter and the reverse, the other side. A search finds factors between these.
+/// Factors to try: a diameter in place of a radius, a radius in place of a diameter, and the opposite direction. A
+/// search finds factors between these.
 const LENGTH_FACTORS: [f64; 3] = [0.5, 2.0, -1.0];
 
-/// A wrong distance between a joint and the joint before it in the description.
+/// A wrong distance between a joint and the previous joint in the robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Length {
     /// The joint.
     pub joint: usize,
-    /// Factor on the distance; negative for the other side.
+    /// Correct distance divided by the described distance; negative for the opposite direction.
     pub factor: f64,
 }
 
 impl MistakeKind for Length {
-    /// The place of the first joint has no influence on torque. A coupled tree has more joints than the log.
+    /// Candidates for every joint except the first, whose location has no influence on torque. None for a robot with
+    /// coupled joints, whose tree has more joints than the log.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let model = setup.model();
         if !matches!(breadth, Breadth::Rare) || model.coupling().is_some() {
@@ -38,7 +40,7 @@ impl MistakeKind for Length {
 
     fn facts(&self) -> Facts {
         Facts {
-            // Descriptions have far more errors in their bodies than in their joints.
+            // Robot descriptions have far more errors in their bodies than in their joints.
             rarity: 0.3,
             joints: Some(vec![self.joint]),
             is_of_all_logs: true,

@@ -1,5 +1,6 @@
-//! The kinds of mistakes that `check` detects: one file each, with candidates, correction, number, key and sentence. A
-//! new kind needs one file here, its `mod`, and one row of `mistake_kinds!`; no other code matches over kinds.
+//! The kinds of mistakes that `check` detects. Each kind has a file with its candidates, correction, free number, study
+//! key and sentence. A new kind needs one file here, its `mod`, and one row of `mistake_kinds!`; no other code matches
+//! over kinds.
 
 pub mod compensated;
 pub mod convention;
@@ -29,7 +30,7 @@ use kind::{Facts, MistakeKind};
 
 macro_rules! mistake_kinds {
     ($($file:ident::$kind:ident,)*) => {
-        /// One mistake of a study. Joints are numbers in the model's order.
+        /// One mistake of a study. Joints are indices in the order of the model.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Mistake {
             $(#[doc = concat!("See [`", stringify!($file), "::", stringify!($kind), "`].")] $kind($file::$kind),)*
@@ -42,7 +43,7 @@ macro_rules! mistake_kinds {
         })*
 
         impl Mistake {
-            /// Candidates in the order of the kinds.
+            /// Candidates of all kinds, in the order of the kinds.
             pub(super) fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
                 let mut all = Vec::new();
                 $(all.extend($file::$kind::candidates(setup, breadth).into_iter().map(Self::$kind));)*
@@ -56,7 +57,7 @@ macro_rules! mistake_kinds {
     };
 }
 
-// Candidates are tried in this order, which decides between equal scores.
+// Candidates are tried in this order. If scores are equal, the first one is selected.
 mistake_kinds! {
     position_unit::PositionUnit,
     torque_unit::TorqueUnit,
@@ -83,30 +84,30 @@ impl Mistake {
         self.kind().sentence(names)
     }
 
-    /// Keys that correct the study; empty if no key does.
+    /// Keys of the study that correct the mistake; empty if no key corrects it.
     pub fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         self.kind().changes(keys)
     }
 
-    /// The range of factors that the logs do not distinguish from its own, as the end of a sentence; empty for a narrow
-    /// range, or without such a factor.
+    /// The range of factors that the logs do not distinguish from the factor of this mistake, as the end of a sentence;
+    /// empty if the range is narrow or the mistake has no factor.
     pub fn other_factors(&self, range: [f64; 2]) -> String {
         self.kind().other_factors(range)
     }
 
-    /// The rows without this mistake. A lag does not change them, since it has different instants.
+    /// The rows after correction of this mistake. A lag does not change them, because it uses other instants.
     pub fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> MotionRows {
         let mut rows = rows.clone();
         self.kind().correct(robot, &mut rows);
         rows
     }
 
-    /// The robot without this mistake; `None` if it does not change.
+    /// The robot after correction of this mistake; `None` if it does not change.
     pub fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
         self.kind().corrected_robot(robot)
     }
 
-    /// The joints, of `dof`, that it concerns.
+    /// The affected joints of a robot with `dof` joints.
     pub fn joints(&self, dof: usize) -> Vec<usize> {
         self.facts().joints.unwrap_or_else(|| (0..dof).collect())
     }
@@ -115,18 +116,18 @@ impl Mistake {
         self.kind().facts()
     }
 
-    /// Whether two mistakes are equal up to their numbers.
+    /// Whether two mistakes are equal except for their numbers.
     pub(super) fn differs_only_in_number(&self, other: &Self) -> bool {
         let [own, other] = [self, other].map(|mistake| mistake.kind().subject().unwrap_or_else(|| mistake.clone()));
         own == other
     }
 
-    /// The same with another number, if it has a number.
+    /// The mistake with another number, if it has a number.
     pub(super) fn with_number(&self, number: f64) -> Self {
         self.kind().with_number(number).unwrap_or_else(|| self.clone())
     }
 
-    /// The same with the nearby number of the smallest `value`; `None` without a free number.
+    /// The mistake with the number nearby that gives the smallest `value`; `None` without a free number.
     pub(super) fn with_best_number(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
         self.kind().with_best_number(&value)
     }
@@ -136,14 +137,15 @@ impl Mistake {
         (channels == Some(Channels::Torque) && !torques.is_empty()).then_some(torques)
     }
 
-    /// The joint whose torque column becomes that of `joint`.
+    /// The joint whose torque column in the study becomes the torque of `joint`.
     pub(super) fn torque_from(&self, joint: usize) -> usize {
         let Facts { channels, torques, .. } = self.facts();
         let source = torques.iter().find(|source| channels != Some(Channels::Position) && source.joint == joint);
         source.map_or(joint, |source| source.from)
     }
 
-    /// The same mistake in the position instead of the torque or the reverse, which logs hardly distinguish.
+    /// The same mistake in the position instead of the torque, or in the torque instead of the position; logs hardly
+    /// distinguish the two.
     pub(super) fn twin(&self) -> Option<Self> {
         self.kind().with_channels(self.facts().channels?.other()?)
     }

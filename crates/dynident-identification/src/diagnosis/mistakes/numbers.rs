@@ -1,21 +1,22 @@
-//! Minima over the number of a mistake.
+//! Search for the best number of a mistake.
 
-/// Number of grid points before refinement: the residual has several local minima between gear ratios.
+/// Number of grid points before refinement. There are several because the residual has local minima between gear
+/// ratios.
 const GRID_POINTS: usize = 17;
 
-/// The free number of a mistake, and its search range.
+/// Free number of a mistake, with its search range.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) struct Number {
     pub(super) at: f64,
-    /// Half width of the search range; of the logarithm of a factor.
+    /// Half-width of the search range; for a factor, half-width of its logarithm.
     pub(in crate::diagnosis) reach: f64,
     pub(super) is_factor: bool,
-    /// Whether it is a common number, such as a unit; then another number has to be clearly better.
+    /// Whether the number is a common one, such as a unit. Another number must then be clearly better to replace it.
     pub(in crate::diagnosis) is_round: bool,
 }
 
 impl Number {
-    /// An angle, rad.
+    /// A free number that is an angle, rad.
     pub(super) fn angle(at: f64, reach: f64) -> Self {
         Self { at, reach, is_factor: false, is_round: false }
     }
@@ -24,12 +25,12 @@ impl Number {
         Self { at, reach, is_factor: true, is_round: false }
     }
 
-    /// The number with the smallest `value`.
+    /// The number with the smallest `value` within the search range.
     pub(super) fn minimum(self, value: impl Fn(f64) -> f64) -> f64 {
         self.local_minima(value).next().unwrap_or(self.at)
     }
 
-    /// Local minima of `value`, the smallest first.
+    /// Numbers at the local minima of `value`, the smallest value first.
     pub(in crate::diagnosis) fn local_minima(self, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
         let Self { at, reach, is_factor, .. } = self;
         let number = move |place: f64| if is_factor { at * place.exp() } else { place };
@@ -37,8 +38,8 @@ impl Number {
     }
 }
 
-/// Local minima of `value` within `reach` of `centre`, the smallest first: minima of a grid, refined by ternary search
-/// to an accuracy of 2 % of the reach.
+/// Positions of the local minima of `value` within `reach` of `centre`, the smallest value first: minima on a grid,
+/// refined by ternary search to an accuracy of 2 % of the reach.
 fn local_minima(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
     let spacing = 2.0 * reach / (GRID_POINTS - 1) as f64;
     let place = move |k: usize| centre - reach + spacing * k as f64;
@@ -50,7 +51,8 @@ fn local_minima(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Ite
     minima.into_iter().map(move |k| ternary_search(around(k).map(place), 0.02 * reach, &value))
 }
 
-/// The minimum of a unimodal `value` between two ends by ternary search, to an accuracy of `width`.
+/// Position of the minimum of a unimodal function `value` between two ends, by ternary search to an accuracy of
+/// `width`.
 pub(in crate::diagnosis) fn ternary_search(ends: [f64; 2], width: f64, value: impl Fn(f64) -> f64) -> f64 {
     let [mut low, mut high] = ends;
     while high - low > width {

@@ -1,4 +1,4 @@
-//! A wrong zero of a position.
+//! Mistake: a wrong zero of a joint position.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
@@ -9,11 +9,11 @@ use crate::diagnosis::motion_rows::MotionRows;
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 use dynident_dynamics::ParametricModel;
 
-/// Tried offsets, rad: a quarter or half a turn, or near zero. A search finds offsets between these.
+/// Offsets to try, rad: a quarter turn, half a turn, or small offsets. A search finds offsets between these.
 const OFFSETS_RAD: [f64; 7] = [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6, -FRAC_PI_6 / 3.0, FRAC_PI_6 / 3.0];
-/// Smaller offsets, rad, which are significant if base parameters are known.
+/// Smaller offsets to try if base parameters are known, rad.
 const SMALL_OFFSETS_RAD: [f64; 6] = [-0.3, -0.15, -0.07, 0.07, 0.15, 0.3];
-/// Factors on an offset that are tried for other robots.
+/// Factors on an offset that are tried with random robots, to test whether the improvement is due to chance.
 const OTHER_OFFSETS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
 
 /// A wrong zero of a joint's position.

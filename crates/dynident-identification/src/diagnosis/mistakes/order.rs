@@ -1,4 +1,4 @@
-//! Columns in another order.
+//! Mistake: columns in another order.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, TorqueSource};
@@ -9,17 +9,17 @@ use dynident_dynamics::ParametricModel;
 use dynident_recording::log::{ChannelGroup, ColumnRef};
 use dynident_text::quoted;
 
-/// The columns are in another order: joint `j` needs the columns of joint `order[j]`.
+/// The columns are in another order: joint `j` must get the columns that the study assigns to joint `order[j]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// The joint with the correct columns, for each joint.
+    /// For each joint, the joint to which the study assigns its columns.
     pub order: Vec<usize>,
     /// Positions, torques, or both.
     pub channels: Channels,
 }
 
 impl MistakeKind for Order {
-    /// Two exchanged joints, the reverse order, or a shift by one joint.
+    /// Candidates: two exchanged joints, the reverse order, or a shift by one joint.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let Breadth::Usual = breadth else { return Vec::new() };
         let dof = setup.robot.dof();
@@ -83,7 +83,7 @@ impl MistakeKind for Order {
             Some(KeyChange { table, line: format!("columns = {}", list(ordered.into_iter().map(name))) })
         };
         let groups = self.channels.each().map(|channels| keys.group(channels));
-        // Velocities and accelerations have the order of the positions.
+        // Velocities and accelerations are reordered together with the positions.
         let is_of_position = self.channels.each().any(|channels| channels == Channels::Position);
         groups.chain(is_of_position.then(|| keys.derivatives()).into_iter().flatten()).filter_map(of).collect()
     }

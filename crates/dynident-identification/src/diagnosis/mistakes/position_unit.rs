@@ -1,4 +1,4 @@
-//! Positions in another unit.
+//! Mistake: positions in another unit.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, joint_list, scale};
@@ -9,26 +9,27 @@ use crate::diagnosis::motion_rows::MotionRows;
 use core::f64::consts::{PI, TAU};
 use dynident_dynamics::ParametricModel;
 
-/// Tried factors: degrees, revolutions, the same converted twice, half revolutions, gear ratios of about 100,
-/// milliradians, encoder counts. A search finds gear ratios and encoder counts between these.
+/// Factors to try: degrees, revolutions, degrees or revolutions converted twice, half revolutions, gear ratios of about
+/// 100, milliradians, encoder counts. A search finds gear ratios and encoder counts between these.
 const UNITS: [f64; 10] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-/// The same for one joint, with factors of two.
+/// Factors to try for one revolute joint, including factors of two.
 const UNITS_OF_ONE: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, 0.5, 2.0, 1e-3, 1e-4];
-/// The same for one prismatic joint.
+/// Factors to try for one prismatic joint.
 const UNITS_OF_ONE_LENGTH: [f64; 4] = [1e-3, 1e3, 0.5, 2.0];
-/// Exact factors of units; others belong to gears or encoders.
+/// Factors that are exact units. Other factors belong to gears or encoders.
 const EXACT_UNITS: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 0.5, 2.0, 1e-3];
 
-/// Largest travel of a joint in its ranges; more shows a unit that is far too small.
+/// Travel of a joint divided by its range in the description, above which the unit is far too small.
 const MAX_TRAVEL_RANGES: f64 = 2.0;
-/// Half width of the search for gear ratios and encoder counts, of the factor's logarithm.
+/// Half-width of the search for gear ratios and encoder counts, as the logarithm of the factor.
 const SEARCH_REACH: f64 = 2.0;
-/// Largest ratio of two factors that are reported as one.
+/// Maximum ratio between the ends of a range of factors that is reported as a single factor.
 const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
-/// Largest logarithm of the ratio of a free factor to a unit that it may not replace.
+/// Minimum logarithm of the ratio between a free factor and a unit; a free factor that is nearer does not replace the
+/// unit.
 const MIN_LOG_RATIO_TO_UNIT: f64 = 0.1;
 
-/// The positions of these joints are in another unit, or on the motor side.
+/// The positions of these joints are in another unit, or were measured on the motor side of the gear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionUnit {
     /// The joints.
@@ -46,7 +47,8 @@ impl PositionUnit {
         self.joints.len() == 1 && self.factor < MAX_TRAVEL_RANGES.recip()
     }
 
-    /// Units of the position of one joint. Units that are far too small are tried only if the joint travels too far.
+    /// Candidates for the unit of one joint's position. Units that are far too small are tried only if the joint
+    /// travels too far.
     fn of_one(setup: Setup<'_>, joint: usize) -> impl Iterator<Item = Self> {
         let description = &setup.model().joints()[joint];
         let units: &[f64] = if description.is_rotary() { &UNITS_OF_ONE } else { &UNITS_OF_ONE_LENGTH };
@@ -131,7 +133,7 @@ impl MistakeKind for PositionUnit {
         Some(Self { factor, ..self.clone() }.into())
     }
 
-    /// `None` for a factor too near to a unit.
+    /// The best factor nearby; `None` if it is too near to a unit.
     fn with_best_number(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let with = |factor: f64| Self { factor, ..self.clone() }.into();
         let found = self.number().minimum(|factor| value(&with(factor)));

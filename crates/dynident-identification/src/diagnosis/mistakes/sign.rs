@@ -1,4 +1,4 @@
-//! A reversed sign.
+//! Mistake: a reversed sign.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, TorqueSource, joint_list, scale};
@@ -8,7 +8,7 @@ use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::log::ChannelGroup;
 
-/// The signs of these joints are reversed. Position and torque together mean a reversed axis.
+/// The signs of these joints are reversed. If position and torque are both reversed, the axis is reversed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sign {
     /// The joints.
@@ -41,8 +41,8 @@ impl MistakeKind for Sign {
             channels: Some(self.channels),
             joints: Some(self.joints.clone()),
             torques: self.joints.iter().map(|&joint| TorqueSource { joint, from: joint, factor: -1.0 }).collect(),
-            // A negative torque of a robot equals a negative position of its mirror image. Descriptions do not define
-            // the sign of a torque.
+            // A robot with a negative torque moves like its mirror image with a negative position. The torque is more
+            // probable, because robot descriptions do not define its sign.
             likelier_channels: Some(Channels::Torque),
             ..Facts::of("sign")
         }

@@ -14,16 +14,16 @@ pub struct KeyChange {
     pub line: String,
 }
 
-/// The present keys of a study that corrections may change.
+/// Present values of the study keys that corrections may change.
 #[derive(Clone, Debug)]
 pub struct StudyKeys {
     /// The format of the log.
     pub format: LogFormat,
-    /// The table of the format: `format`, or that of one log.
+    /// Name of the format's table in the study: `format`, or the table of one log.
     pub table: String,
-    /// Number of the log's joint, for each joint of the model.
+    /// For each joint of the model, its index among the joints of the log.
     pub places: Vec<usize>,
-    /// Number of the log's joints.
+    /// Number of joints in the log.
     pub columns: usize,
     /// `torque_lag_s` under `[motion]`.
     pub torque_lag_s: Option<OneOrMany<f64>>,
@@ -32,7 +32,7 @@ pub struct StudyKeys {
 }
 
 impl StudyKeys {
-    /// The columns of positions or torques, if the format has them, and their table.
+    /// The columns of positions or torques, if the format has them, and the name of their table.
     pub(super) fn group(&self, channels: Channels) -> (Option<&ChannelGroup>, String) {
         let (group, name) = match channels {
             Channels::Torque => (self.format.torque.as_ref(), "torque"),
@@ -41,7 +41,7 @@ impl StudyKeys {
         (group, format!("{}.{name}", self.table))
     }
 
-    /// The columns of logged velocities and accelerations, and their tables.
+    /// The columns of logged velocities and accelerations, and the names of their tables.
     pub(super) fn derivatives(&self) -> [(Option<&ChannelGroup>, String); 2] {
         let Self { format, table, .. } = self;
         [
@@ -55,13 +55,14 @@ impl StudyKeys {
         self.table == "format"
     }
 
-    /// `key` of positions or torques with one value for each joint of the log, computed by `value`.
+    /// A change of `key` for positions or torques, with one value for each joint of the log; `value` computes the
+    /// values.
     pub(super) fn per_column(&self, channels: Channels, key: &str, value: impl Fn(usize) -> String) -> KeyChange {
         let (_, table) = self.group(channels);
         KeyChange { table, line: format!("{key} = {}", list((0..self.columns).map(value))) }
     }
 
-    /// `scale` with the values of `joints` times `factor`.
+    /// A change of `scale`: the values of `joints` are multiplied by `factor`.
     pub(super) fn scales(&self, channels: Channels, joints: &[usize], factor: f64) -> KeyChange {
         let (group, _) = self.group(channels);
         let places: Vec<usize> = joints.iter().map(|&joint| self.places[joint]).collect();
@@ -71,8 +72,8 @@ impl StudyKeys {
         })
     }
 
-    /// `scale` of the torque columns, times the factor of each joint. A joint without a factor keeps its scale, and a
-    /// comment states the numbers of these columns.
+    /// A change of `scale` for the torque columns: each is multiplied by the factor of its joint. A joint without a
+    /// factor keeps its scale, and a comment states the numbers of these columns.
     pub fn torque_scale(&self, factors: &[Option<f64>]) -> KeyChange {
         let (group, table) = self.group(Channels::Torque);
         let factor = |place: usize| {
@@ -92,13 +93,13 @@ impl StudyKeys {
         KeyChange { table, line: format!("scale = {}{comment}", list((0..self.columns).map(value))) }
     }
 
-    /// `scale` of the torque columns in one unit of `unit` Nm (N): one number if all columns have the same scale in the
-    /// study.
+    /// A change of `scale` for torque columns that are all in the same unit of `unit` Nm (N): one number if all columns
+    /// have the same scale in the study.
     pub fn torque_unit(&self, unit: f64) -> KeyChange {
         let (group, table) = self.group(Channels::Torque);
         let own = group.and_then(|group| group.scale.as_ref());
         let own: Vec<f64> = (0..self.columns).map(|place| at(own, place, 1.0)).collect();
-        // A unit is exact.
+        // A unit is an exact number, so it is not rounded.
         let value = |own: &f64| if *own == 1.0 { format!("{unit:?}") } else { significant(unit * own) };
         let line = match own.first() {
             Some(first) if own.iter().all(|other| other == first) => format!("scale = {}", value(first)),
@@ -116,7 +117,7 @@ pub(super) fn list(values: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", values.into_iter().collect::<Vec<_>>().join(", "))
 }
 
-/// A TOML float with at most `decimals` decimals.
+/// Text of a TOML float with at most `decimals` decimals.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let mut text = format!("{value:.decimals$}");
     while text.ends_with('0') && !text.ends_with(".0") {
@@ -125,7 +126,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-/// Three significant digits; nine for the exact factor of a unit.
+/// Text of a number with three significant digits, or nine for the exact factor of a unit.
 pub(super) fn significant(value: f64) -> String {
     let units = [PI / 180.0, 180.0 / PI, TAU, TAU.recip(), PI, PI.recip()];
     let places = if units.iter().any(|unit| (value / unit - 1.0).abs() < 1e-9) { 8.0 } else { 2.0 };

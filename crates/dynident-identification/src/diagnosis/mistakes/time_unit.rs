@@ -1,4 +1,4 @@
-//! Another unit of time, or another rate.
+//! Mistake: another unit of time, or another sample rate.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, scale};
@@ -9,20 +9,20 @@ use crate::diagnosis::plausibility::{beyond_limits, is_rate_of_a_recorder};
 use dynident_dynamics::ParametricModel;
 use dynident_recording::log::TimeUnit as LogUnit;
 
-/// Tried units of time.
+/// Units of time to try.
 const UNITS: [f64; 8] = [1e-3, 1e-6, 1e-9, 1e-2, 1e3, 1e6, 1e9, 1e2];
-/// Tried factors on the rate: every second sample, a decimal place, minutes.
+/// Factors on the sample rate to try: every second sample, a decimal place, minutes.
 const OTHER_RATES: [f64; 5] = [0.5, 2.0, 0.1, 10.0, 60.0];
 
-/// The time stamps have another unit, or the recorder another rate.
+/// The time stamps have another unit, or the recorder has another rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeUnit {
-    /// Factor on times.
+    /// Factor on the times.
     pub factor: f64,
 }
 
 impl MistakeKind for TimeUnit {
-    /// Units are tried only if the rate is implausible or the robot would be too fast.
+    /// Candidates. Units are tried only if the rate is implausible or the robot would be too fast.
     fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
         let limits = &setup.settings.motion;
         let is_plausible = |rate_hz: f64| is_rate_of_a_recorder(setup.model(), rate_hz, limits);

@@ -1,4 +1,4 @@
-//! The torque of one joint in another unit.
+//! Mistake: the torque of one joint in another unit.
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, TorqueSource, scale};
@@ -9,9 +9,9 @@ use crate::diagnosis::motion_rows::MotionRows;
 use crate::diagnosis::span::dot;
 use dynident_dynamics::ParametricModel;
 
-/// Tried factors: units, gear ratios, one motor of two. A search finds factors between these, such as motor constants.
+/// Factors to try: units, gear ratios, one motor of two. A search finds factors between these, such as motor constants.
 const UNITS: [f64; 16] = [0.77, 1.3, 0.6, 1.6, 0.5, 2.0, 0.2, 5.0, 0.1, 10.0, 0.03, 30.0, 0.01, 100.0, 1e-3, 1e3];
-/// Exact factors of units and pairs of motors; others belong to gears or motor constants.
+/// Factors that are exact units, or one motor of two. Other factors belong to gears or motor constants.
 const EXACT_UNITS: [f64; 8] = [0.5, 2.0, 0.1, 10.0, 0.01, 100.0, 1e-3, 1e3];
 /// Factors that are reported as a gain, not as a unit.
 const GAIN_FACTORS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
@@ -21,7 +21,7 @@ const GAIN_FACTORS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
 pub struct TorqueUnit {
     /// The joint.
     pub joint: usize,
-    /// Factor on its torque.
+    /// Factor on the joint's torque.
     pub factor: f64,
 }
 

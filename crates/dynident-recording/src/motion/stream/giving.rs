@@ -1,4 +1,4 @@
-//! Differentiates samples on the uniform clock and returns them as blocks.
+//! Differentiation of the samples on the uniform clock, which are returned as blocks.
 
 use super::MotionStream;
 use crate::derivative::{Derivatives, Place, SampleRanges};
@@ -7,11 +7,11 @@ use crate::motion::block::MotionBlock;
 use crate::motion::marks::kept_runs;
 use core::ops::Range;
 
-/// The samples of a block, and the window that the differentiator needs, as indices in `uniform`.
+/// Samples of a block, and the window of samples that the differentiator needs for them, as indices in `uniform`.
 struct Span {
     given: Range<usize>,
     window: Range<usize>,
-    /// Whether the segment ends with this span.
+    /// Whether the segment ends with this block.
     is_last: bool,
 }
 
@@ -30,7 +30,8 @@ impl Span {
 }
 
 impl MotionStream {
-    /// Differentiates and returns the samples from the first new one to `end`; false if trimming removes all of them.
+    /// Differentiates and returns the samples up to `end` that were not returned yet; returns false if the trimming of
+    /// ends removes all of them.
     pub(super) fn give(&mut self, block: &mut MotionBlock, end: usize, last: bool) -> Result<bool, RecordingError> {
         let context = self.context.unwrap_or(usize::MAX);
         let window_end = if last { self.uniform[0].len() } else { end + context };
@@ -99,7 +100,7 @@ impl MotionStream {
         }
     }
 
-    /// Marks the torques in the intervals that the log ignores.
+    /// Marks the torques in the time intervals that the log ignores.
     fn ignore_torques(&self, block: &mut MotionBlock) {
         let rows = block.rows;
         for ignored in &self.ignored_torque {
@@ -114,8 +115,8 @@ impl MotionStream {
         }
     }
 
-    /// Adds a joint's motion, torque and temperature to a block. Returns the samples where the differentiator does not
-    /// apply, as indices in the window.
+    /// Adds the motion, torque and temperature of a joint to a block. Returns the samples for which the differentiator
+    /// is not valid, as indices in the window.
     fn differentiate(
         &mut self,
         block: &mut MotionBlock,
@@ -173,15 +174,15 @@ impl MotionStream {
         }
     }
 
-    /// Leaves out the marked samples. The other samples become separate pieces. `first` is the index of the block's
-    /// first row in the window to which the marks belong.
+    /// Omits the marked samples; the other samples become separate pieces. `first` is the index of the block's first
+    /// row in the window to which the marks belong.
     fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[Range<usize>], first: usize) {
         let runs = kept_runs(marked, first, block.rows);
         let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();
         self.unmapped += (block.rows - kept) as u64;
         self.given -= (block.rows - kept) as u64;
         for run in &runs {
-            // A run at the block's start continues the previous piece.
+            // A range that begins at the block's start continues the previous piece.
             self.cuts += usize::from(run.start > 0 || self.in_cut);
             let mut kept = block.part(run.clone());
             kept.segment = self.segments + self.cuts;
