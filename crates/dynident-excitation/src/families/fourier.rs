@@ -13,7 +13,7 @@ const NAME: &str = "fourier";
 pub struct FourierSettings {
     /// Number of harmonics H. Default 5.
     pub harmonics: usize,
-    /// Exact rest (q̇ = q̈ = 0) at both ends. Default true; false selects the plain periodic series.
+    /// Whether both ends are exactly at rest (q̇ = q̈ = 0). Default true; false selects the plain periodic series.
     pub rest: bool,
     /// Number of periods within the duration. Default 1. Higher frequencies increase the information, so a long
     /// experiment is better with several periods.

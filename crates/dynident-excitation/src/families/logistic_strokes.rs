@@ -39,8 +39,8 @@ pub struct LogisticStrokesSettings {
     pub order: StrokeOrder,
     /// Whether the motion ends at its start position. Default true.
     pub returns: bool,
-    /// κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. A free parameter for spliced
-    /// strokes.
+    /// Sharpness κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. For spliced strokes κ
+    /// is a free parameter.
     pub sharpness: f64,
     /// Maximum steepness ω of overlapping strokes, 1/s. Default 15.
     pub omega_max: f64,
@@ -218,8 +218,9 @@ impl Family for LogisticStrokes {
         self.joints * self.parameters_per_joint()
     }
 
-    /// Overlapping: ω from that of a stroke over the whole duration to the maximum, positions in time from 0 to 1.
-    /// Spliced: κ from 2√3 to 40, slots up to e³ times longer or shorter than the last.
+    /// Bounds for overlapping strokes: ω from that of a stroke over the whole duration to the maximum, positions in
+    /// time from 0 to 1. For spliced strokes: κ from 2√3 to 40, slots at most e³ times longer or shorter than the
+    /// last slot.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let count = self.settings.strokes;
         let (third, fourth) = match self.settings.order {

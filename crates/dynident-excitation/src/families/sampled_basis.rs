@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 /// Number of samples in a block, equal to the widest SIMD register.
 const BLOCK: usize = 8;
-/// Values of one column in one block: four derivatives (orders 0 to 3).
+/// Number of values of one column in one block: four derivatives (orders 0 to 3).
 const CELL: usize = 4 * BLOCK;
 /// Number of samples above which a grid is processed in pieces that are not stored.
 const MAX_STORED_SAMPLES: usize = 4096;

@@ -30,7 +30,7 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Factors on the limits of all joints, for a slower or weaker motion: one number for velocity, acceleration and
-    /// torque, or a table with one for each. Limits that `joints` states are not scaled. 1 by default.
+    /// torque, or a table with one number for each. Limits that are given in `joints` are not scaled. Default 1.
     #[serde(skip_serializing_if = "LimitScale::is_one")]
     pub scale: LimitScale,
     /// Limits of single joints, at most one entry per joint.
@@ -43,8 +43,8 @@ pub struct Limits {
     pub column: Option<ColumnLimit>,
     /// Minimum distances between the arm's own links.
     pub self_collision: Option<SelfCollision>,
-    /// Torque in addition to that of the rigid bodies that torque and power limits include. Not part of files: it comes
-    /// from the robot description and from other knowledge about the drives.
+    /// Torque in addition to that of the rigid bodies that torque and power limits include. Not part of study files:
+    /// it comes from the robot description and from other knowledge about the drives.
     #[serde(skip)]
     pub known_torque: KnownTorque,
 }

@@ -14,8 +14,8 @@ pub(crate) struct SolidPairs {
     /// Pairs that are not checked because their shapes overlap, although they are neither adjacent nor ignored.
     /// Define other shapes for links that can collide.
     pub left_out: Vec<[String; 2]>,
-    /// Pairs that are always closer than the clearance but touch in no tested posture: they are close by design and not
-    /// checked.
+    /// Pairs that are always closer than the clearance but touch in no tested posture. They are close by design and
+    /// not checked.
     pub close: Vec<[String; 2]>,
 }
 

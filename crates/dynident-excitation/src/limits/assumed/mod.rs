@@ -31,17 +31,17 @@ pub struct AssumedLimits {
     pub floor: bool,
     /// Minimum distance between links. Default true.
     pub self_collision: bool,
-    /// Acceleration of every joint with a velocity limit: full speed is reached within 0.2 rad from rest, or within a
-    /// tenth of the stroke of a prismatic joint. Default true.
+    /// Whether the acceleration of every joint with a velocity limit is limited: the joint reaches full speed from
+    /// rest within 0.2 rad, or within a tenth of the range of a prismatic joint. Default true.
     pub acceleration: bool,
     /// Margin to each position limit of the robot description, in percent of half the position range. Default 5.
     pub stop_margin_percent: f64,
-    /// Maximum number of convex pieces of the mesh of a collision shape whose convex hull is too coarse. Default 8; 1
-    /// keeps the hulls.
+    /// Maximum number of convex pieces into which the mesh of a collision shape is cut if its convex hull is too
+    /// coarse. Default 8; 1 keeps the hulls.
     pub mesh_pieces: usize,
-    /// Maximum number of turns between the start of the motion and any position of a revolute joint without position
-    /// limits. With a `start_posture` the range extends by this number to either side of it, otherwise by half of it to
-    /// either side of home, or of zero. 0 means no limit. Default 1.
+    /// Range, in turns, of a revolute joint without position limits. With a `start_posture` the joint may move by
+    /// this number of turns to either side of it, otherwise by half of this number to either side of the home
+    /// position, or of zero. 0 means no limit. Default 1.
     pub continuous_turns: f64,
     /// Thresholds of the assumptions; they are not part of study files.
     #[serde(skip)]
@@ -80,7 +80,7 @@ impl AssumedLimits {
 /// All limits of an experiment, and a description of their origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitsInForce {
-    /// Limits of the robot description and the assumptions, overridden by the study.
+    /// Limits of the robot description and assumed limits; limits given in the study replace both.
     pub limits: Limits,
     /// Assumptions, each with the key that changes it.
     pub assumed: Vec<String>,

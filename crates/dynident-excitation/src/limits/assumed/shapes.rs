@@ -22,8 +22,8 @@ pub struct ShapesOfLinks {
     /// Links with a capsule from joint to joint: all links of a robot description without shapes, and links with an
     /// unusable shape.
     pub stand_ins: Vec<String>,
-    /// Links without a shape in a robot description that has shapes elsewhere: links with a mass, and one link of each
-    /// body without shapes.
+    /// Links without a shape in a robot description that has shapes for other links: links with a mass, and one link
+    /// of each body without shapes.
     pub without: Vec<String>,
     /// Unusable shapes, each with its link, file and reason.
     pub dropped: Vec<String>,

@@ -18,8 +18,9 @@ pub struct AssumptionThresholds {
     /// Depth below the base in the neutral posture, as a share of the arm's length. A machine that extends deeper is
     /// assumed to hang. Default 0.25.
     pub max_depth_below_base: f64,
-    /// Maximum share of the random postures in which two hulls violate the clearance but their meshes do not; above it
-    /// meshes are cut into convex pieces. Smaller shares do not keep a search from good motions. Default 0.05.
+    /// Largest accepted share of random postures in which the hulls of two links violate the clearance although their
+    /// meshes do not. Above it the meshes are cut into convex pieces. A smaller share hardly restricts the search.
+    /// Default 0.05.
     pub max_hull_only_share: f64,
 }
 
