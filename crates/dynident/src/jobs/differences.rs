@@ -1,4 +1,4 @@
-//! Explanations of the difference from a robot description, as results list them.
+//! Explanations of the difference between an identified robot and its description, as results list them.
 
 use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison};
 use dynident_estimation::HALF_WIDTH_95;
@@ -9,7 +9,7 @@ use dynident_model::Model;
 /// Probability below which an explanation is omitted.
 pub(in crate::jobs) const MIN_LISTED_PROBABILITY: f64 = 0.01;
 
-/// The explanations, the most probable first; all in which every body differs are one.
+/// The explanations, most probable first. All explanations in which every body differs are merged.
 pub(in crate::jobs) fn explanations_of(
     found: &DescriptionDifferences,
     model: &Model,
@@ -48,7 +48,8 @@ pub(in crate::jobs) fn description_comparison(
     })
 }
 
-/// A body with the change of its ten values: of its mass, and its centre if the change of the mass is significant.
+/// A changed body with the change of its ten values: the change of its mass, and the change of its centre of mass if
+/// the change of the mass is significant.
 pub(in crate::jobs) fn changed_body(part: String, change: &[f64], mass_std: f64) -> ChangedPart {
     let (mass, half_width) = (change[0], HALF_WIDTH_95 * mass_std);
     let centre = (mass.abs() > half_width).then(|| [change[1] / mass, change[2] / mass, change[3] / mass]);

@@ -1,4 +1,4 @@
-//! `compare`: results side by side, and what changed between them.
+//! `compare`: several results next to each other, and what changed between them.
 
 use crate::error::Error;
 use crate::jobs::differences::{MIN_LISTED_PROBABILITY, changed_body, explanations_of};
@@ -18,7 +18,7 @@ use dynident_model::terms::TorqueTerm;
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 
-/// Results of one type of robot side by side: parameters, bodies, friction, errors, and which parts changed. A single
+/// Compares results of one type of robot: parameters, bodies, friction, errors, and which parts changed. A single
 /// result is compared with its robot description.
 ///
 /// The covariance of a difference is the sum of both covariances, so the results should be of different logs.
@@ -75,7 +75,8 @@ fn parameter<'a>(result: &'a ResultFile, expression: &str) -> Option<&'a BasePar
     result.base_parameters.iter().find(|own| own.expression == expression)
 }
 
-/// Expressions of the parameters that all results excite, in the order of the first; and the others with the reason.
+/// Expressions of the parameters that the logs of all results excite, in the order of the first result; and the other
+/// parameters, each with the reason why it is not compared.
 fn common_parameters(results: &[(ResultFile, PathBuf)]) -> (Vec<&str>, Vec<String>) {
     let (mut common, mut left): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
     for own in results.iter().flat_map(|(result, _)| &result.base_parameters) {
@@ -201,7 +202,7 @@ fn estimate(result: &ResultFile, path: &Path, names: &[&str]) -> Result<(DVector
     Ok((values, DMatrix::from_fn(places.len(), places.len(), |a, b| rows[places[a]][places[b]])))
 }
 
-/// Names of parameters that the robot's structure also has, with their indices there.
+/// The names that are also base parameters of the robot's structure, with their indices there.
 fn known_rows<'a>(robot: &RobotModel, names: &[&'a str]) -> (Vec<&'a str>, Vec<usize>, BaseParameters) {
     let terms: Vec<TorqueTerm> = robot.terms().map(|(term, _)| term.clone()).collect();
     let base = BaseParameters::new(robot.model(), &terms, &BaseParameterSettings::default());
@@ -230,7 +231,7 @@ fn between(
     changes_of((new - old, covariance), &robot, &parts, (index, Some(0)), path)
 }
 
-/// Changes of a result from its robot description; `None` if the description has no inertial values.
+/// Changes between a robot description and a result; `None` if the description has no inertial values.
 fn from_description(result: &ResultFile, path: &Path, common: &[&str]) -> Result<Option<ChangesFrom>, Error> {
     let robot = stored_robot(result, path)?;
     let described: Vec<&str> =
