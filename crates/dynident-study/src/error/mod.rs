@@ -52,9 +52,9 @@ pub enum StudyFileError {
     Missing {
         /// The file.
         file: PathBuf,
-        /// The paths tried.
+        /// The paths that were searched.
         tried: Vec<PathBuf>,
-        /// Source of the recordings.
+        /// Source of the recordings, if known.
         source_of_data: Option<String>,
     },
     /// A robot description that cannot be read.
@@ -73,7 +73,7 @@ pub enum StudyFileError {
     /// cause and the fix.
     #[error("log `{log}`: {source}")]
     Recording {
-        /// The log.
+        /// Name of the log.
         log: String,
         /// The problem.
         source: Box<RecordingError>,
