@@ -47,7 +47,7 @@ fn with_motion(trial: &Trial<'_>, motion: &Motion) -> MotionBlock {
 }
 
 fn filtered<'a>(trial: &Trial<'a>, motion: &MotionBlock, cutoff_hz: f64) -> Result<Rows<'a>, EstimationError> {
-    // A failure of the pipeline is counted as a failure of the estimator; its reason is not needed.
+    // A failure of the pipeline is a failure of the estimator; its reason is not needed.
     Rows::new(trial.scenario, motion, Some(cutoff_hz)).map_err(|_| EstimationError::Empty)
 }
 

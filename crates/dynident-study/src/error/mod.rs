@@ -31,7 +31,7 @@ pub enum StudyFileError {
         path: PathBuf,
         /// Line, from 1.
         line: u32,
-        /// Column, from 1.
+        /// Column, in characters from 1.
         column: u32,
         /// The problem.
         source: Box<StudyError>,
@@ -82,7 +82,7 @@ pub enum StudyFileError {
     /// Correct the printed line.
     #[error("{}:{line}: {message}", path.display())]
     Table {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
         /// Line, from 1.
         line: u64,

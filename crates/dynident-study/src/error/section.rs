@@ -133,9 +133,9 @@ pub enum StudyError {
         "validation log `{held_out}` contains samples of the training log `{training}`: select parts that do not overlap in both [[log]] entries (both by rows, by fraction, or by time_range_s), or use another file"
     )]
     Overlap {
-        /// The training log.
+        /// Name of the training log.
         training: String,
-        /// The held-out log.
+        /// Name of the held-out log.
         held_out: String,
     },
     /// Two files contain the same recording, for example a copy or a longer export. Validation then only repeats the
@@ -144,11 +144,11 @@ pub enum StudyError {
         "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): name the file of another run in this [[log]], or select parts that do not overlap"
     )]
     SameSamples {
-        /// The training log.
+        /// Name of the training log.
         training: String,
         /// First common row of the training log, 0-based.
         training_row: u64,
-        /// The held-out log.
+        /// Name of the held-out log.
         held_out: String,
         /// First common row of the held-out log, 0-based.
         held_out_row: u64,
@@ -159,11 +159,11 @@ pub enum StudyError {
         "training logs `{first}` and `{second}` contain the same samples: row {second_row} of `{second}` and the following equal those of `{first}` from row {first_row}, which would make the error bars too small: remove one of the logs, or select rows that do not overlap"
     )]
     RepeatedRows {
-        /// The first training log.
+        /// Name of the first training log.
         first: String,
         /// First common row of the first log, 0-based.
         first_row: u64,
-        /// The second training log.
+        /// Name of the second training log.
         second: String,
         /// First common row of the second log, 0-based.
         second_row: u64,

@@ -36,7 +36,7 @@ pub enum RobotChoice {
     /// The simulator with the settings of `[simulation]`.
     #[default]
     Simulation,
-    /// Another program over the line protocol.
+    /// Another program that uses the line protocol.
     Process(ProcessSettings),
     /// A person with a folder: Dynident writes files and reads a log.
     Folder(FolderSettings),
