@@ -13,7 +13,7 @@ use dynident_identification::estimators::{FourierSeries, PeriodicModel, Periodic
 const RATE_HZ: f64 = 250.0;
 
 /// Cramér-Rao bound of the base parameters' standard deviations for unbiased estimators, with the motion as a Fourier
-/// series with unknown coefficients; `None` for friction with hysteresis. Computed for one period and scaled to all
+/// series with unknown coefficients; `None` for load-dependent friction. Computed for one period and scaled to all
 /// periods.
 pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f64>>, EstimationError> {
     if made.regressor.needs_load() {

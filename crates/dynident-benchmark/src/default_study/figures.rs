@@ -31,7 +31,7 @@ impl Sum for Covered {
 pub struct ErrorOfName {
     /// RMS error over the runs in which it converged, relative to the standard deviation of the torque.
     pub error: f64,
-    /// Error of the default settings in the same runs, before the projection to physical consistency.
+    /// Error of the default settings in the same runs, without the conditions of physical consistency.
     pub of_default: f64,
     /// Number of runs in which it converged.
     pub settled: usize,
@@ -77,13 +77,13 @@ pub struct CaseFigures {
     pub runs: usize,
     /// Error of the physically consistent model that a study with default settings writes.
     pub of_default: f64,
-    /// Error of the default settings' estimate before the projection to physical consistency.
+    /// Error of the default settings' estimate without the conditions of physical consistency.
     pub of_default_free: f64,
     /// Error of the written model with the true friction laws and default settings for everything else.
     pub of_laws_stated: f64,
     /// Error of the written model with the true friction laws, the true lag and the best cut-off.
     pub of_best: f64,
-    /// Error of the estimate before the projection to physical consistency, with the true friction laws, the true lag
+    /// Error of the estimate without the conditions of physical consistency, with the true friction laws, the true lag
     /// and the best cut-off.
     pub of_best_free: f64,
     /// Best cut-off relative to that from the position spectra.
