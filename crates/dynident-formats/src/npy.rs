@@ -132,8 +132,8 @@ fn arrays(
             shape.push(field.count);
         }
         let Some([rows, columns]) = Array::two_sides(&shape) else { continue };
-        // The entries of a field are contiguous in any order of the items, and a vector has only one order, so column-
-        // major order matters only for arrays without fields.
+        // The entries of a field are contiguous in any order of the items, and a vector has only one order. The order
+        // therefore matters only if an item is a single number.
         let column_major = header.fortran && field.count == 1;
         let make = if column_major { Array::column_major } else { Array::row_major };
         arrays.push(make(label, [rows, columns], values));

@@ -111,7 +111,7 @@ impl PrintFigure {
     }
 }
 
-/// Minimum width of a figure in pixels with text of 12 px: one plot needs at least this width.
+/// Minimum and maximum width of a figure in pixels with text of 12 px: room for one plot, and the size of a poster.
 const MIN_WIDTH: f64 = 200.0;
 const MAX_WIDTH: f64 = 20_000.0;
 
