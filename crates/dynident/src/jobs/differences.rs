@@ -9,7 +9,7 @@ use dynident_model::Model;
 /// Probability below which an explanation is omitted.
 const MIN_LISTED_PROBABILITY: f64 = 0.01;
 
-/// The explanations, the most probable first; all in which every body differs are one.
+/// The explanations, most probable first. All explanations in which every body differs are merged.
 pub(in crate::jobs) fn explanations_of(
     found: &Differences,
     model: &Model,
