@@ -278,8 +278,9 @@ impl Differences {
     }
 }
 
-/// Groups of unknowns for the parts that are `tested`: for a body a change of its ten values, as by a load, and a common factor of all its values; for
-/// another part its terms. Their parts, the change per unknown, and the effect on the base parameters.
+/// Groups of unknowns for the parts that are `tested`. A body has two groups: a change of its ten values, as by a load,
+/// and a common factor of all its values. The group of another part contains its terms. Returns the part of each group,
+/// the change of the values per unknown, and the effect on the base parameters.
 fn groups(
     robot: &ParametricModel,
     all: Parts,
