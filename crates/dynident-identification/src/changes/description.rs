@@ -101,7 +101,8 @@ pub struct DescriptionDifferences {
     pub(super) unknowns: Vec<DMatrix<f64>>,
     /// Difference of the compared base parameters from the description.
     pub(super) difference: DVector<f64>,
-    /// Covariance of the estimates of these base parameters; it treats friction and drive parameters as unknown.
+    /// Covariance of the estimated base parameters that are compared; friction and drive parameters are treated as
+    /// unknown.
     pub(super) covariance: DMatrix<f64>,
     /// Matrix E: effect of all inertial parameters on the compared base parameters.
     pub(super) effects: DMatrix<f64>,
