@@ -18,6 +18,7 @@ import json
 import queue
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -204,7 +205,10 @@ class Program:
         self.begin(message["rate_hz"], *state(rows[0][1])[:2], peak)
         largest = {name: np.zeros(n) for name in ("tracking_error", "speed", "torque")}
         truly_left = None
-        for part, row in rows:
+        clock = time.monotonic()
+        for sample_number, (part, row) in enumerate(rows):
+            if self.options.real_time:
+                time.sleep(max(0.0, clock + sample_number / message["rate_hz"] - time.monotonic()))
             where = f"{row[0]:.3f} s of the {part}"
             target = [row[1 + k * n: 1 + (k + 1) * n] for k in range(3)]
             true_q, true_dq = self.robot.q.copy(), self.robot.dq.copy()
@@ -259,6 +263,7 @@ def parser_for(description):
     parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the position loop inside the drives, Nm/rad (N/m)")
     parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the position loop inside the drives, Nm s/rad (N s/m)")
     parser.add_argument("--step", type=float, default=1e-3, help="maximum integration step, s")
+    parser.add_argument("--real-time", action="store_true", help="keep motions to the clock of the computer")
     parser.add_argument("--gravity", type=numbers, help="gravity in the world frame, m/s^2 (default: 9.81 down)")
     parser.add_argument("--stribeck", type=numbers, default=0.0, help="additional dry friction at rest (Stribeck), Nm (N)")
     parser.add_argument("--stribeck-speed", type=numbers, default=0.05, help="velocity at which the --stribeck friction has decreased to a third, rad/s (m/s)")

@@ -16,12 +16,12 @@ use dynident_identification::{
 };
 use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
-/// A robot and its recordings.
+/// A cell of the table: a robot and the settings of its recordings.
 #[derive(Clone, Copy, Debug)]
 pub struct CutoffCell {
     /// The robot.
     pub robot: SimulatedRobot,
-    /// Its recordings.
+    /// Settings of the robot's recordings.
     pub log: SimulatedLog,
 }
 
@@ -36,7 +36,7 @@ const fn cell(
     CutoffCell { robot, log: SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise } }
 }
 
-/// The registry: one line per cell.
+/// The registry: one line per robot and recording.
 pub const CUTOFF_CELLS: &[CutoffCell] = &[
     cell(UR10, 5, 10.0, 500.0, 1e-5, 0.01),
     cell(UR10, 5, 10.0, 500.0, 1e-4, 0.01),
@@ -53,40 +53,41 @@ pub const CUTOFF_CELLS: &[CutoffCell] = &[
     cell(PANDA, 20, 30.0, 500.0, 1e-4, 0.03),
 ];
 
-/// Candidates in units of the cut-off from the spectrum.
+/// Compared cut-offs, relative to the cut-off from the position spectrum.
 const CUTOFF_MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
-/// Index of the cut-off from the spectrum.
+/// Index in `CUTOFF_MULTIPLES` of the cut-off from the position spectrum.
 const SPECTRUM_INDEX: usize = 2;
-/// Velocity at which Coulomb friction has reached 76 %: the default of a study.
+/// Speed at which the smoothed Coulomb friction reaches 76 % of its final value, rad/s or m/s: the default of a
+/// study.
 const COULOMB_WIDTH: f64 = 0.02;
 
-/// Errors of one cell, RMS over its runs, as shares.
+/// Torque errors of one cell, RMS over its runs, relative to the standard deviation of the torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutoffFigures {
-    /// Cut-off from the positions' spectra, mean over the runs, Hz.
+    /// Cut-off from the position spectra, mean over the runs, Hz.
     pub spectrum_hz: f64,
     /// Error with the cut-off from the spectra.
     pub of_spectrum: f64,
     /// Error with the default cut-off.
     pub of_default: f64,
-    /// Error of motion and parameters estimated together without a cut-off, and the runs that did not converge; `None`
-    /// if not computed.
+    /// Error if motion and parameters are estimated together without a cut-off, and the number of runs that did not
+    /// converge; `None` if not computed.
     pub simultaneous: Option<(f64, usize)>,
     /// Error with the best cut-off, which is the same in all runs.
     pub best: f64,
-    /// Best cut-off in units of that from the spectra.
+    /// Best cut-off relative to that from the position spectra.
     pub best_multiple: f64,
 }
 
 impl CutoffFigures {
-    /// Error of the default relative to that of the best cut-off.
+    /// Ratio of the error with the default cut-off to that with the best cut-off.
     pub fn default_over_best(&self) -> f64 {
         self.of_default / self.best
     }
 }
 
-/// Fits `runs` recordings of a cell with the default cut-off and with each candidate; and motion and parameters
-/// together if `simultaneous`.
+/// Fits `runs` recordings of a cell with the default cut-off and with each compared one. If `simultaneous` is set, it
+/// also estimates motion and parameters together.
 ///
 /// # Errors
 /// A robot, motion or recording that cannot be created, a default fit that fails.

@@ -1,7 +1,7 @@
 //! Automatically selected friction compared with the true friction laws: robots × motions × friction laws.
 //!
-//! As in [`cutoffs`](crate::cutoffs), the error is that of the fitted model's torque on another random motion without
-//! noise: RMS over joints, each in units of the standard deviation of its torque.
+//! Like in [`cutoffs`](crate::cutoffs), the error is that of the fitted model's torque on another random motion
+//! without noise: RMS over joints, each relative to the standard deviation of its torque.
 
 use crate::accuracy::BenchmarkError;
 use crate::simulated_logs::{
@@ -27,26 +27,26 @@ use dynident_model::{Joint, Model};
 pub enum FrictionTruth {
     /// Viscous and Coulomb friction.
     Plain,
-    /// Plain, direction-dependent: 30 and 40 % more backward.
+    /// Viscous and Coulomb friction that depend on the direction: 30 and 40 % larger backward.
     Asymmetric,
-    /// Plain, with half of the Coulomb friction added near rest.
+    /// Viscous and Coulomb friction, with half of the Coulomb friction added near rest.
     Stribeck,
-    /// Viscous friction and a smooth step away from rest.
+    /// Viscous friction and a sigmoid (smoothed step) centred at a nonzero velocity.
     Sigmoid,
-    /// Plain, and a tenth of the load.
+    /// Viscous and Coulomb friction, and a tenth of the transmitted torque.
     Load,
 }
 
-/// Width of the true step, rad/s; not a start value of the search.
+/// Width of the true smoothed sign function, rad/s; different from the start values of the search.
 const STEP_WIDTH_RAD_S: f64 = 0.015;
 /// Stribeck velocity, rad/s, and exponent: between the candidates of the search.
 const STRIBECK_VELOCITY_AND_EXPONENT: (f64, f64) = (0.07, 1.5);
-/// Steepness of the shifted step, s/rad, and its velocity, rad/s.
+/// Steepness of the sigmoid, s/rad, and the velocity of its centre, rad/s.
 const SIGMOID_STEEPNESS_AND_VELOCITY: (f64, f64) = (50.0, 0.015);
-/// Friction as a share of the load.
+/// Load-dependent friction relative to the transmitted torque.
 const LOAD_SHARE: f64 = 0.1;
-/// A term is distinguishable if it improves the best fit by this many standard deviations of the noise, over all
-/// samples together.
+/// A term can be distinguished if it reduces the residual of the best fit by this many standard deviations of the
+/// noise, over all samples together.
 pub(crate) const MIN_DETECTABLE_STD: f64 = 10.0;
 
 impl FrictionTruth {
@@ -97,14 +97,14 @@ impl FrictionTruth {
         terms
     }
 
-    /// Ratio of the parameter of one of its terms to a typical one.
+    /// Ratio of a parameter of this law to its typical value.
     pub(crate) fn share(self, term: &TorqueTerm) -> f64 {
         let mut own = term.own_joint().into_iter().flat_map(|joint| self.terms_with_shares(joint));
         own.find(|(own, _)| own == term).map_or(1.0, |(_, share)| share)
     }
 
-    /// Whether the term distinguishes this law from others, i.e. its law is not part of plain friction. Plain friction
-    /// is distinguished by its step.
+    /// Whether the term distinguishes this law from viscous and Coulomb friction. If the law is only these two, its
+    /// Coulomb friction distinguishes it from viscous friction.
     pub(crate) fn is_distinguished_by(self, term: &TorqueTerm) -> bool {
         let Some(law) = term.candidate() else { return false };
         let has_law = |truth: Self| truth.terms(0).iter().any(|own| own.candidate() == Some(law));
@@ -112,14 +112,14 @@ impl FrictionTruth {
     }
 }
 
-/// A robot, its recordings and its friction.
+/// A robot, the settings of its recordings, and its friction.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionCell {
     /// The robot.
     pub robot: SimulatedRobot,
-    /// Its recordings.
+    /// Settings of the robot's recordings.
     pub log: SimulatedLog,
-    /// Its friction.
+    /// True friction of its joints.
     pub truth: FrictionTruth,
 }
 
@@ -136,22 +136,23 @@ pub fn friction_cells() -> Vec<FrictionCell> {
     MOTIONS.into_iter().flat_map(with).collect()
 }
 
-/// Results of one cell over its runs; errors are RMS values, as shares.
+/// Torque errors of one cell, RMS over its runs, relative to the standard deviation of the torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFigures {
-    /// Number of joints, over all runs, whose friction law the recordings can distinguish.
+    /// Number of joints, over all runs, whose friction law can be distinguished with these recordings.
     pub tellable: usize,
-    /// Number of these joints for which the law was selected.
+    /// Number of these joints for which the true law was selected.
     pub told: usize,
-    /// Error with selected friction.
+    /// Error with automatically selected friction.
     pub of_choice: f64,
-    /// Error with the true terms.
+    /// Error with the true friction laws.
     pub of_truth: f64,
     /// Error with viscous and Coulomb friction.
     pub of_plain: f64,
 }
 
-/// Fits `runs` recordings of a cell with selected, true and plain friction.
+/// Fits `runs` recordings of a cell with selected friction, with true friction, and with viscous and Coulomb
+/// friction.
 ///
 /// # Errors
 /// A robot, motion or recording that cannot be created, a fit that fails.
@@ -188,14 +189,15 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
     Ok(figures)
 }
 
-/// Default drive terms of a study without keys; the width of the step is that of a usual arm, scaled to the robot.
+/// Drive terms of a study without friction keys; the width of the smoothed sign function is that of a typical arm,
+/// scaled to the robot.
 pub(crate) fn usual_drive(model: &Model, joint: usize) -> DriveChoice {
     let width = model.characteristic_scale().velocity(model.joints()[joint].is_rotary(), CoulombShape::USUAL_WIDTH);
     let coulomb = Some(CoulombShape::Smooth { width });
     DriveChoice { viscous: true, coulomb, offset: true, ..DriveChoice::default() }
 }
 
-/// Friction search of such a study, by joint.
+/// Friction search of a study without friction keys, by joint.
 pub(crate) fn usual_searches(model: &Model) -> Vec<FrictionSearch> {
     let search = |(joint, description): (usize, &Joint)| {
         let coulomb = usual_drive(model, joint).coulomb;
@@ -204,7 +206,7 @@ pub(crate) fn usual_searches(model: &Model) -> Vec<FrictionSearch> {
     model.joints().iter().enumerate().map(search).collect()
 }
 
-/// For plain friction the robot without its Coulomb step, else `None`.
+/// If the true friction is viscous and Coulomb friction, the robot without its Coulomb friction; otherwise `None`.
 fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<ParametricModel> {
     if truth != FrictionTruth::Plain {
         return None;
@@ -238,7 +240,7 @@ impl Made {
         Ok(Self { log, motion, exact, torque_noise: made.torque_noise, other, other_exact })
     }
 
-    /// Joints whose exact torque differs from the best fit of `without` by more than noise.
+    /// Joints whose exact torque differs from the best fit of `without` by more than the noise.
     fn tellable(&self, without: &ParametricModel) -> Result<Vec<bool>, EstimationError> {
         let left = unexplained_torque(&RegressorModel::from(without.clone()), &self.motion, &self.exact)?;
         let noise = |joint: usize| self.torque_noise * rms(&self.exact[self.motion.of(joint)]);

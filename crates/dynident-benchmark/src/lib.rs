@@ -1,7 +1,8 @@
-//! **Accuracy benchmarks.** [`accuracy`] is the benchmark of `dynident benchmark`: estimators compared with each other
-//! and with the Cramér-Rao bound. [`cutoffs`] and [`friction_truths`] compare the default cut-off and friction with
-//! the best possible choice, [`default_study`] all defaults of a study without keys. The program `dynident-benchmark`
-//! measures speed; `benchmarks/` compares its results with other libraries.
+//! **Accuracy benchmarks.** [`accuracy`] is the benchmark of `dynident benchmark`: it compares estimators with each
+//! other and with the Cramér-Rao bound. [`cutoffs`] and [`friction_truths`] compare the default cut-off and the
+//! default friction with the best possible choice, and [`default_study`] all defaults of a study that sets nothing
+//! but its files. The program `dynident-benchmark` measures speed; `benchmarks/` compares its results with other
+//! libraries.
 
 #![forbid(unsafe_code)]
 

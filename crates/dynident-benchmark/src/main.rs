@@ -12,7 +12,7 @@ use dynident_model::load_robot;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Times Dynident on robots and prints JSON lines. Compare results of one run only, and use the minima.
+/// Times Dynident on robots and prints JSON lines. Compare only results of the same run, and use the minima.
 #[derive(Parser)]
 #[command(version)]
 struct Options {
@@ -22,7 +22,7 @@ struct Options {
     /// Only this processor level (portable, AVX2, AVX-512); default: all levels of this processor.
     #[arg(long)]
     level: Option<String>,
-    /// Samples in a batch. Use an odd multiple of eight, so that the columns of a panel do not map to the same cache
+    /// Samples in a batch. Use an odd multiple of eight, so that the columns of a batch do not map to the same cache
     /// sets.
     #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
     block: u16,
@@ -32,23 +32,23 @@ struct Options {
     /// Text file for --limits: a recording of the Panda arm, created if missing.
     #[arg(long, default_value = "target/benchmark.csv")]
     csv: PathBuf,
-    /// Rows of the recording if it is created.
+    /// Rows of the recording if it has to be created.
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     csv_rows: u32,
-    /// Only these quantities; with --limits also peak_flops, memory and text.
+    /// Measure only these quantities; with --limits also peak_flops, memory and text.
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
-    /// Robots by name.
+    /// Names of the robots.
     #[arg(default_values_t = ["planar2r", "ur10", "panda_arm7", "iiwa14", "talos_reduced"].map(String::from))]
     names: Vec<String>,
 }
 
-/// The robot whose recording is read as text.
+/// Name of the robot whose recording is read as text.
 const RECORDED: &str = "panda_arm7";
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    // The clock measures this thread, so all work must be on it.
+    // The clock measures only this thread, so all work must run on it.
     if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global() {
         eprintln!("{error}");
         return ExitCode::FAILURE;

@@ -16,12 +16,12 @@ pub(crate) const PERIOD_S: f64 = 10.0;
 /// Limits of position and speed for joints with wider or no limits.
 const MAX_POSITION_RAD: f64 = 3.0;
 const MAX_SPEED_RAD_S: f64 = 2.0;
-/// Viscous and dry friction at RMS velocity, and offsets, relative to the RMS torque of the bodies; load-dependent
-/// friction is a share of the load.
+/// Viscous and Coulomb friction at RMS velocity, and offsets, relative to the RMS torque of the bodies;
+/// load-dependent friction is relative to the transmitted torque.
 const VISCOUS_SHARE: f64 = 0.15;
 const COULOMB_SHARE: f64 = 0.15;
 const OFFSET_SHARE: f64 = 0.03;
-/// Minimum of that torque, Nm, because unloaded joints also have friction.
+/// Smallest value used for that RMS torque, Nm, because joints without torque of the bodies also have friction.
 const MIN_TORQUE_NM: f64 = 0.5;
 
 /// A robot of the tables.
@@ -50,7 +50,7 @@ impl SimulatedRobot {
 /// Settings of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulatedLog {
-    /// Harmonics of 0.1 Hz.
+    /// Number of harmonics, 0.1 Hz apart.
     pub harmonics: usize,
     /// Length, s.
     pub duration_s: f64,
@@ -58,11 +58,11 @@ pub struct SimulatedLog {
     pub rate_hz: f64,
     /// Standard deviation of the positions' white noise, rad.
     pub position_noise_rad: f64,
-    /// Standard deviation of a torque's white noise relative to its RMS.
+    /// Standard deviation of a torque's white noise relative to the RMS of the torque.
     pub torque_noise: f64,
 }
 
-/// A random Fourier motion with `harmonics` harmonics within the robot's ranges and speeds.
+/// A random Fourier motion with `harmonics` harmonics within the position and speed limits of the robot.
 pub(crate) fn excitation(
     model: &Model,
     harmonics: usize,
@@ -74,7 +74,8 @@ pub(crate) fn excitation(
     Ok(sampled(&family, &parameters, duration_s, rate_hz, 0.0))
 }
 
-/// A Fourier series with `harmonics` harmonics, and random parameters within the robot's ranges and speeds.
+/// A Fourier series with `harmonics` harmonics, and random parameters with which it keeps the position and speed
+/// limits of the robot.
 pub(crate) fn random_series(
     model: &Model,
     harmonics: usize,
@@ -100,7 +101,7 @@ pub(crate) fn random_series(
 /// A motion at a constant rate, delayed by `late_s`, and repeated before and after its period.
 pub(crate) fn sampled(family: &Fourier, parameters: &[f64], duration_s: f64, rate_hz: f64, late_s: f64) -> Motion {
     let samples = 0..=(duration_s * rate_hz) as usize;
-    // A family is at rest outside its duration.
+    // A trajectory family is at rest outside its duration.
     let phase_s = |sample: usize| (sample as f64 / rate_hz - late_s).rem_euclid(family.duration_s());
     let times: Vec<f64> = samples.map(phase_s).collect();
     let mut motion = Motion::default();
@@ -108,8 +109,8 @@ pub(crate) fn sampled(family: &Fourier, parameters: &[f64], duration_s: f64, rat
     motion
 }
 
-/// Parameters with the nominal bodies, and friction and offsets relative to the torque of the bodies; `share` scales
-/// each term.
+/// Parameters of the bodies in the robot description, with friction and offsets relative to the torque of the bodies;
+/// `share` scales each term.
 pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(&TorqueTerm) -> f64) -> Vec<f64> {
     let mut parameters = regressor.model().parameter_vector();
     let first = parameters.len();
@@ -132,8 +133,8 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
     regressor.base().values(&parameters)
 }
 
-/// Simulated encoder and torque signals of a motion with this torque (joint-major), and the cut-off from the
-/// positions' spectra, Hz.
+/// Simulated encoder and torque signals of a motion with this torque (joint by joint), and the cut-off from the
+/// position spectra, Hz.
 pub(crate) fn recording(
     made: &SimulatedLog,
     model: &Model,
@@ -160,7 +161,8 @@ pub(crate) fn recording(
     log.map(|log| (log, asked_hz)).map_err(|source| source.to_string())
 }
 
-/// RMS over joints of the error of a torque, each in units of the standard deviation of the exact torque; joint-major.
+/// Error of a torque, relative to the standard deviation of the exact torque of each joint, RMS over joints. Torques
+/// are stored joint by joint.
 pub(crate) fn model_error(motion: &Motion, exact: &[f64], found: &[f64]) -> f64 {
     let dof = exact.len() / motion.samples;
     let joints = (0..dof).map(|joint| {
@@ -173,7 +175,7 @@ pub(crate) fn model_error(motion: &Motion, exact: &[f64], found: &[f64]) -> f64 
     (joints.sum::<f64>() / dof as f64).sqrt()
 }
 
-/// Torque of base parameters on a motion, joint-major.
+/// Torque from base parameters on a motion, stored joint by joint.
 pub(crate) fn torque(regressor: &RegressorModel, motion: &Motion, theta: &[f64]) -> Vec<f64> {
     let panels = panels(regressor, motion);
     let layout = regressor.layout();

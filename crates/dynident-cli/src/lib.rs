@@ -115,14 +115,15 @@ enum Command {
 enum Verdict {
     /// Success: exit status 0.
     Good,
-    /// Executed with a negative verdict: exit status 1.
+    /// The command was executed, but its result is negative: exit status 1.
     Negative,
     /// Interrupted by Ctrl-C after a clean stop: exit status 130.
     Interrupted,
 }
 
 /// Runs the command line `arguments`, beginning with the program name, and returns the exit status: 0 for success, 1
-/// for a negative verdict, 2 for an error, 130 after Ctrl-C. Results go to standard output, messages to standard error.
+/// for a negative result, 2 for an error, 130 after Ctrl-C. Results go to standard output, messages to standard
+/// error.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     if commands::version::is_requested(&arguments) {
@@ -176,7 +177,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 fn refused(error: &clap::Error) {
     let text = error.render().to_string();
     if terminal::readable(&text) == text {
-        // A closed terminal is ignored.
+        // An error of printing, for example on a closed terminal, is ignored.
         let _ = error.print();
     } else {
         terminal::complain(text.strip_prefix("error: ").unwrap_or(&text));

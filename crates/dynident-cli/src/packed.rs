@@ -1,9 +1,9 @@
-//! Text files inside the program, which the build script packs.
+//! Text files that are part of the program; the build script compresses them.
 
 use flate2::read::DeflateDecoder;
 use std::io::Read;
 
-/// A file inside the program.
+/// A text file that is part of the program.
 pub(crate) struct PackedFile {
     pub(crate) name: String,
     pub(crate) text: String,
@@ -14,7 +14,7 @@ pub(crate) fn schemas() -> Result<Vec<PackedFile>, String> {
     files(include_bytes!(concat!(env!("OUT_DIR"), "/schemas.deflate")))
 }
 
-/// The robot and the logs of the example.
+/// The robot and the logs of the example of `init`.
 pub(crate) fn example() -> Result<Vec<PackedFile>, String> {
     files(include_bytes!(concat!(env!("OUT_DIR"), "/example.deflate")))
 }

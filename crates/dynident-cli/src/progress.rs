@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Delay of the bar, and update interval of a stage without progress.
+/// Delay until the progress bar appears, and update interval of a stage that reports no progress.
 const BAR_DELAY: Duration = Duration::from_secs(1);
 
-/// Template for a stage without known progress.
+/// Template of the progress line for a stage with unknown progress.
 const WITHOUT_ROWS: &str = "{msg} {spinner} {elapsed}";
 
-/// Template for a stage with an unknown total.
+/// Template of the progress line for a stage with an unknown total.
 const WITH_ROWS: &str = "{msg} {spinner} {human_pos} rows  {elapsed}";
 
 #[derive(Default)]
@@ -86,10 +86,10 @@ impl Progress for Bar {
     }
 }
 
-/// Interval of the lines without a terminal.
+/// Interval of the progress lines without a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Progress without a terminal: a line every five seconds, also in a stage that reports none.
+/// Progress without a terminal: a line every five seconds, also in a stage that reports no progress.
 pub(crate) struct Lines {
     stage: Arc<Mutex<Option<LineStage>>>,
     printer: Option<(Sender<()>, JoinHandle<()>)>,

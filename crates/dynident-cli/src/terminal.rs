@@ -1,10 +1,10 @@
-//! All printing. Printed text may contain external text (names in files, file names, output of robot programs), so
-//! control characters are made visible.
+//! Everything that the program prints. Printed text may contain external text (names in files, file names, output of
+//! robot programs), so control characters are made visible.
 
 use dynident_text::{shortened_lines, visible};
 use std::io::{self, IsTerminal, Write as _};
 
-/// Columns of text in a pipe.
+/// Number of columns of the text if it is not printed to a terminal.
 const DEFAULT_WIDTH: usize = 80;
 
 /// Prints text for people to standard output, with long lines shortened. A closed pipe (`| head`) ends the printing,
@@ -21,7 +21,7 @@ pub(crate) fn print_document(text: &str) -> Result<(), String> {
     written(write!(out, "{text}{end}").and_then(|()| out.flush()))
 }
 
-/// Prints text of the program itself without changes; a script may contain tabs.
+/// Prints text that is part of the program, without changes; a script may contain tabs.
 pub(crate) fn print_own(text: &[u8]) -> Result<(), String> {
     let mut out = io::stdout().lock();
     written(out.write_all(text).and_then(|()| out.flush()))

@@ -1,4 +1,4 @@
-//! Access to inertial parameters: of one model, or of another robot in every lane.
+//! Access to inertial parameters: of one model for all lanes, or of a different robot in every lane.
 
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Vec3};

@@ -47,8 +47,8 @@ pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     }
 }
 
-/// One step outward: motion of a body from that of its parent and the transform in `body`. `gravity` is the
-/// acceleration of the base, minus gravity.
+/// One step outward: motion of a body from the motion of its parent and the transform in `body`. `gravity` is the
+/// acceleration of the base minus gravity.
 #[inline(always)]
 pub(crate) fn moved<T: Scalar>(
     map: &JointMap,
@@ -119,7 +119,7 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
         let axis = map.axis.splat::<T>();
         let (inner, outer) = scratch.composites.split_at_mut(index);
         let composite = &outer[0];
-        // Force and moment that accelerate the composite along its joint's axis.
+        // Force and moment that accelerate the composite along or about its joint's axis.
         let (mut force, mut moment) = if map.is_rotary {
             (axis.cross(composite.first_moment), composite.inertia_matrix().mul_vec(axis))
         } else {

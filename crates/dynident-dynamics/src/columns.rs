@@ -1,7 +1,8 @@
-//! Storage of the columns of the composite-rigid-body algorithm: one wrench per joint, several per bundle.
+//! Storage of the columns of the composite-rigid-body algorithm: each joint has one wrench, and a bundle holds
+//! several.
 //!
-//! The columns of a run of joints without branches are adjacent, in joint order, and every run starts a new bundle,
-//! followed by the runs of its child branches. So the columns of a joint's subtree fill consecutive bundles. Lanes of
+//! The columns of a run of joints without branches are adjacent, in joint order. Every run starts a new bundle and is
+//! followed by the runs of its child branches, so the columns of a joint's subtree fill consecutive bundles. Lanes of
 //! inner joints, whose columns do not exist yet, are zero.
 
 use dynident_lanes::Lane;
@@ -15,9 +16,9 @@ pub(crate) struct ColumnScratch<T: Lane> {
     pub(crate) end: Vec<usize>,
     pub(crate) force: Vec<Vec3<T::Bundle>>,
     pub(crate) moment: Vec<Vec3<T::Bundle>>,
-    /// Work of the columns of each joint's subtree on its axis: one row of bundles per joint.
+    /// Products of the columns of each joint's subtree with its axis: one row of bundles per joint.
     pub(crate) rows: Vec<f64>,
-    /// For all pairs of a joint and an ancestor: index of the work in `rows`, and the two entries of the matrix.
+    /// For every pair of a joint and an ancestor: index of the product in `rows`, and the two entries of the matrix.
     pub(crate) entries: Vec<Entry>,
 }
 

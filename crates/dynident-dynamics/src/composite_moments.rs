@@ -29,8 +29,8 @@ impl<T: Scalar> CompositeMoments<T> {
         }
     }
 
-    /// In the frame of the parent. If the parent rotates about an axis at rest, only `Σ_xx + Σ_yy` matters, and it is
-    /// stored in `Σ_xx`.
+    /// Moments in the frame of the parent. If the parent rotates about an axis at rest, only `Σ_xx + Σ_yy` matters;
+    /// it is stored in `Σ_xx`.
     #[inline(always)]
     pub(crate) fn up(
         &self,
@@ -51,7 +51,8 @@ impl<T: Scalar> CompositeMoments<T> {
         }
     }
 
-    /// Moments about a point that is `-t` from the origin: `h + m t` and, with `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
+    /// Moments about a point at `-t` from the origin: first moment `h + m t` and, with `g = h + m t/2`, second moment
+    /// `Σ + t gᵀ + g tᵀ`.
     #[inline(always)]
     fn about_shifted(self, step: &JointStep, bodies: impl Bodies<T>, t: Vec3<T>, index: usize) -> Self {
         let Self { first, second: s } = self;
@@ -88,8 +89,8 @@ impl<T: Scalar> CompositeMoments<T> {
     }
 }
 
-/// Inward step: moments of joint `index` and its subtree. `next` are the moments from the next body, in registers;
-/// `kept` those of the other children and of the body itself.
+/// Inward step: moments of joint `index` and its subtree. `next` contains the moments from the next body, in
+/// registers, `kept` the moments of the other children and of the body itself.
 #[inline(always)]
 pub(crate) fn gathered<T: Scalar>(
     step: &JointStep,

@@ -9,12 +9,12 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
 use dynident_model::Model;
 use dynident_model::terms::JointMotion;
 
-/// The matrix `C(q, q̇)` of Christoffel symbols, row-major, dof × dof, Nm s (N s for a prismatic joint): the
+/// Computes the matrix `C(q, q̇)` of Christoffel symbols, row-major, dof × dof, Nm s (N s for a prismatic joint). The
 /// velocity-dependent torque is `C q̇`, and `Ṁ = C + Cᵀ`, so that `Ṁ − 2C` is skew-symmetric. Passivity-based and
-/// adaptive controllers need `C(q, q̇) q̇_r` with another velocity, which inverse dynamics do not give.
+/// adaptive controllers need `C(q, q̇) q̇_r` with another velocity `q̇_r`, which inverse dynamics do not give.
 ///
-/// With axes `S` and their rates `Ψ̇ = v × S` in the base frame, the inertia `I` and the body Coriolis matrix `B` of a
-/// subtree are sums. For a joint `i` on the path from the base to `j`
+/// Axes `S` and their rates `Ψ̇ = v × S` are in the base frame; the inertia `I` and the body Coriolis matrix `B` of a
+/// subtree are sums over its bodies. For a joint `i` on the path from the base to `j`
 ///
 /// ```text
 /// C_ij = S_i · (B_j S_j + I_j Ψ̇_j)      C_ji = S_i · (B_jᵀ S_j) + Ψ̇_i · (I_j S_j)

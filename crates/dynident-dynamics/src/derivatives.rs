@@ -21,10 +21,12 @@ pub struct InverseDynamicsDerivatives<'w> {
     pub by_acceleration: &'w [f64],
 }
 
-/// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, analytic.
+/// Computes the analytic derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) with respect to position,
+/// velocity and acceleration.
 ///
-/// With axes `S`, their rates `Ψ̇ = v × S`, `Ψ̈ = a × S + v × Ψ̇` and inertias all in the base frame, the inertia `I`,
-/// Coriolis matrix `B` and wrench `f` of a subtree are sums. For a joint `i` on the path from the base to `j`
+/// Axes `S`, their rates `Ψ̇ = v × S`, `Ψ̈ = a × S + v × Ψ̇` and inertias are all in the base frame. The inertia `I`,
+/// Coriolis matrix `B` and wrench `f` of a subtree are sums over its bodies. For a joint `i` on the path from the
+/// base to `j`
 ///
 /// ```text
 /// ∂τ_i/∂q_j = S_i · (2 B_j Ψ̇_j + I_j Ψ̈_j + S_j ×* f_j)      ∂τ_j/∂q_i = 2 Ψ̇_i · (B_jᵀ S_j) + Ψ̈_i · (I_j S_j)
@@ -67,8 +69,8 @@ pub fn inverse_dynamics_derivatives<'w>(
 }
 
 /// Derivatives of several samples: entry `(i, k)` of sample `s` is at `[(i * dof + k) * samples + s]`.
-/// [`inverse_dynamics_derivatives`] of every sample of a motion, by position, velocity and acceleration in this order,
-/// into arrays that keep the zeros of a tree.
+/// Computes [`inverse_dynamics_derivatives`] of every sample of a motion with respect to position, velocity and
+/// acceleration (in this order). Entries of joints on different branches stay zero.
 ///
 /// Allocation-free once the arrays have grown to the number of samples, except for robots with coupled joints.
 ///

@@ -8,7 +8,7 @@ use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{JointStep, Mat3, Model, Vec3};
 
-/// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
+/// Computes the joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
 ///
 /// Articulated-body algorithm: Featherstone (2008), section 7.3, over the model's inner frames
 /// ([`JointStep`](dynident_model::JointStep)); the velocity terms come from the outward recursion of the inverse
@@ -36,7 +36,7 @@ pub fn forward_dynamics<'w>(
 
 one_sample_kernel!((q, dq, tau), articulated_bodies, ddq: ddq);
 
-/// Coupled joints: a subtree has no separate articulated inertia, so `M q̈ = τ - bias` is solved by a Cholesky
+/// Coupled joints: a subtree has no separate articulated inertia. `M q̈ = τ - bias` is therefore solved by a Cholesky
 /// factorisation, which exists if every degree of freedom moves inertia.
 fn of_coupled_joints<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64], dq: &[f64], tau: &[f64]) -> &'w [f64] {
     mass_matrix_and_bias(model, workspace, q, dq);
@@ -92,7 +92,7 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     let articulated = &mut scratch.articulated[..joints];
     let (tau, ddq) = (&scratch.tau[..joints], &mut scratch.ddq[..joints]);
     // With q̈ = 0 the outward recursion gives the velocity-dependent and gravity accelerations of the bodies; their
-    // wrench is the bias. The rest is linear in the joint accelerations.
+    // wrench is the bias. The remaining accelerations are linear in the joint accelerations.
     ddq.fill(T::ZERO);
     outward(model, hinges, motions, wrenches, &scratch.dq[..joints], ddq);
     for (own, step) in articulated.iter_mut().zip(steps) {
@@ -119,9 +119,9 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         own.inverse_inertia = along(column.0, column.1).recip();
         own.rest_torque = tau[index] - along(link.moment, link.force);
         let Some(parent) = step.parent else { continue };
-        // The parent receives the inertia and bias minus the part released by the joint. Both are moved to the
-        // parent's frame before the subtraction, so that the division above has time: dependent steps limit this
-        // algorithm.
+        // The parent receives inertia and bias without the part that the joint cannot transmit. Both are moved to the
+        // parent's frame before the subtraction, so that the division above has time to finish: dependent steps limit
+        // the speed of this algorithm.
         let t = hinges.translation(step, index);
         let ([column_moment, column_force, moment, force], j, m, h) = with_hinge!(hinges, *step, index, |hinge| {
             (

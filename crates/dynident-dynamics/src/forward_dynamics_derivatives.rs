@@ -19,10 +19,11 @@ pub struct ForwardDynamicsDerivatives<'w> {
     pub by_torque: &'w [f64],
 }
 
-/// Derivatives of [`forward_dynamics`](crate::forward_dynamics()) by position, velocity and torque, analytic.
+/// Computes the analytic derivatives of [`forward_dynamics`](crate::forward_dynamics()) with respect to position,
+/// velocity and torque.
 ///
-/// From the derivatives of `M q̈ + C q̇ + g = τ`, with those of the [inverse dynamics](inverse_dynamics_derivatives)
-/// at the resulting accelerations:
+/// They follow from the derivatives of `M q̈ + C q̇ + g = τ`, with the derivatives of the [inverse
+/// dynamics](inverse_dynamics_derivatives) at the computed accelerations:
 ///
 /// ```text
 /// ∂q̈/∂q = -M⁻¹ ∂τ/∂q      ∂q̈/∂q̇ = -M⁻¹ ∂τ/∂q̇      ∂q̈/∂τ = M⁻¹

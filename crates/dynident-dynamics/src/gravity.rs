@@ -19,11 +19,11 @@ pub fn gravity_torque<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]
     inverse_dynamics(model, workspace, q, rest, rest)
 }
 
-/// `∂g/∂q`, row-major, dof × dof, Nm/rad (N/m): derivative of the gravity torque by the position. It is the second
-/// derivative of the potential energy, so it is symmetric: the stiffness due to gravity.
+/// Computes `∂g/∂q`, row-major, dof × dof, Nm/rad (N/m): derivative of the gravity torque with respect to position.
+/// It is the stiffness due to gravity, and symmetric, because it is the second derivative of the potential energy.
 ///
-/// With axes `S` in the base frame, the inertia `I` of a subtree and `a` minus gravity, for a joint `i` on the path
-/// from the base to `j`
+/// Axes `S` are in the base frame, `I` is the inertia of a subtree and `a` minus the gravity acceleration. For a
+/// joint `i` on the path from the base to `j`
 ///
 /// ```text
 /// ∂g_i/∂q_j = S_i · (S_j ×* I_j a + I_j (a × S_j))

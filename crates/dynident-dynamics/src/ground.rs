@@ -1,5 +1,5 @@
-//! Spatial quantities in one frame, that of the base: axes, velocities and accelerations are twists at the base's
-//! origin, and the inertia of a subtree is the sum of its bodies' inertias.
+//! Spatial quantities in the base frame only: axes, velocities and accelerations are twists at the base's origin, and
+//! the inertia of a subtree is the sum of its bodies' inertias.
 //!
 //! Twists and wrenches are spatial vectors at one point in one frame, angular part first (Featherstone 2008, chapter
 //! 2), so no change of frame is needed. Inertia is stored as mass `m`, first moment `h = ∫ x dm` and second moment `Σ

@@ -1,5 +1,6 @@
-//! Change of frame over one joint with the model's steps ([`JointStep`]): axes are z, and most constant rotations are
-//! the identity or a quarter turn about x, so that rotating a vector takes four products instead of nine.
+//! Change of frame over one joint with the model's steps ([`JointStep`]). All joint axes are z, and most constant
+//! rotations are the identity or a quarter turn about x, so that rotating a vector takes four products instead of
+//! nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointStep, Mat3, Shift, Vec3};
@@ -152,7 +153,8 @@ impl<T: Scalar> Hinges<T> {
         T::sin_cos_all(&self.position, &mut self.sine, &mut self.cosine);
     }
 
-    /// Places only the joints with a parent: results that do not depend on the base's orientation need no more.
+    /// Computes the placements of joints with a parent only, for results that do not depend on the base's
+    /// orientation.
     #[inline(always)]
     pub(crate) fn place_below_base(&mut self, steps: &[JointStep], q: &[T]) {
         let joints = steps.len();
@@ -218,7 +220,7 @@ pub(crate) fn times_shift<T: Scalar>(shift: Shift, t: Vec3<T>, m: &Mat3<T>, adde
         Shift::X => along!(0),
         Shift::Y => along!(1),
         Shift::Z => along!(2),
-        // The addend is last, because it is available last.
+        // The addend comes last, because it is computed last.
         Shift::Any => m.mul_vec(t) + addend,
     }
 }
@@ -249,7 +251,7 @@ pub(crate) fn minus_cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>,
     }
 }
 
-/// The same hinges for bundles: the rotated vectors are in several lanes.
+/// The same hinges for bundles: the rotated vectors are in several SIMD lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct BundledHinges<'a, T>(pub(crate) PlacedHinges<'a, T>);
 

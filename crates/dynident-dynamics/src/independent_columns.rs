@@ -19,13 +19,13 @@ pub struct IndependentColumns {
     pub regrouping: DMatrix<f64>,
     /// Smallest remaining share of a column that was accepted as independent (1 without independent columns).
     pub weakest_independent: f64,
-    /// Largest remaining share of a column that was called dependent (0 without dependent columns).
+    /// Largest remaining share of a column that was rejected as dependent (0 without dependent columns).
     pub strongest_dependent: f64,
 }
 
-/// Splits the columns of `matrix` from left to right. A column is dependent if the part orthogonal to all earlier
-/// independent columns is at most `tolerance` times its norm, or if the column is rounding noise: its norm is below
-/// 1e-12 or `tolerance²` of the largest.
+/// Splits the columns of `matrix` from left to right. A column is dependent if its part orthogonal to all earlier
+/// independent columns is at most `tolerance` times its norm. It is also dependent if it is rounding noise: its norm
+/// is below 1e-12 or `tolerance²` of the largest norm.
 ///
 /// Householder reflections that **skip dependent columns without using a row**. The textbook rule (dependent if the
 /// diagonal entry of R is small) depends on rounding noise in the used row and can misclassify all later columns.
@@ -35,9 +35,9 @@ pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> Independent
     split_columns(matrix, tolerance)
 }
 
-/// As [`independent_columns`], but for robot regressors: a column whose norm is below `tolerance` times the largest
-/// column norm is dependent. Such a column is nonzero only because of rounded angles in the robot description (9.81 ·
-/// 4e-10 for π as 3.141592654).
+/// Like [`independent_columns`], but for robot regressors: a column whose norm is below `tolerance` times the largest
+/// column norm is also dependent. Such a column is nonzero only because of rounded angles in the robot description
+/// (9.81 · 4e-10 for π as 3.141592654).
 pub(crate) fn independent_regressor_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
     split_above(matrix, tolerance, ROUNDING_SHARE.max(tolerance))
 }
@@ -63,14 +63,14 @@ impl Columns for DMatrix<f64> {
     }
 }
 
-/// [`independent_columns`] of streamed columns, one at a time: all earlier reflections, then a new one. Stored are the
-/// reflections without their zeros, the triangle of the independent columns, and the entries of the dependent columns
-/// in its rows.
+/// Does [`independent_columns`] for streamed columns, one at a time: applies all earlier reflections, then makes a
+/// new one. It stores the reflections without their zeros, the triangle of the independent columns, and the entries
+/// of the dependent columns in its rows.
 pub(crate) fn split_columns(columns: &impl Columns, tolerance: f64) -> IndependentColumns {
     split_above(columns, tolerance, ROUNDING_SHARE.max(tolerance * tolerance))
 }
 
-/// Columns below `noise` times the largest are dependent.
+/// Columns with a norm below `noise` times the largest norm are dependent.
 fn split_above(columns: &impl Columns, tolerance: f64, noise: f64) -> IndependentColumns {
     let rows = columns.rows();
     let mut column = Column { entries: DVector::zeros(rows), end: 0 };
@@ -80,7 +80,7 @@ fn split_above(columns: &impl Columns, tolerance: f64, noise: f64) -> Independen
         norms.push(column.from(0).norm());
     });
     let largest = norms.iter().copied().fold(0.0, f64::max);
-    // A column of rounding noise would be independent if compared with its own norm only.
+    // A column of rounding noise would appear independent if compared with its own norm only.
     let noise = noise * largest;
     let (mut independent, mut dependent) = (Vec::new(), Vec::new());
     let (mut weakest_independent, mut strongest_dependent) = (1.0_f64, 0.0_f64);
@@ -140,8 +140,8 @@ impl Column {
         self.end = entries.len();
     }
 
-    /// The rows from `row` on without zeros at the end, rounded up to a multiple of eight: sums are taken in eights,
-    /// so the result is bit-identical to that over all rows.
+    /// The rows from `row` on without zeros at the end, rounded up to a multiple of eight. Sums are taken over groups
+    /// of eight, so the result is bit-identical to that over all rows.
     fn from(&self, row: usize) -> DVectorView<'_, f64> {
         let length = self.end.saturating_sub(row).next_multiple_of(8).min(self.entries.len() - row);
         DVectorView::from_slice(&self.entries.as_slice()[row..], length)

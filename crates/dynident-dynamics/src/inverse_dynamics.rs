@@ -10,8 +10,8 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointStep, Mat3, Model, Vec3};
 
-/// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without
-/// friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
+/// Computes the joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial
+/// parameters, without friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
 /// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior are treated as
@@ -57,7 +57,7 @@ pub fn inverse_dynamics<'w>(
     vector
 }
 
-/// [`inverse_dynamics`] of every sample: `tau[joint * samples + sample]`, joint-major like the motion.
+/// Computes [`inverse_dynamics`] of every sample: `tau[joint * samples + sample]`, joint-major like the motion.
 ///
 /// # Panics
 /// If an array's length is not joints × samples, or for a workspace of another size.
@@ -117,14 +117,14 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
     newton_euler_placed(model, scratch);
 }
 
-/// As [`newton_euler`] with placed hinges.
+/// Like [`newton_euler`], with hinges that are already placed.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let base = (-model.gravity()).splat();
     newton_euler_of(model.steps(), model.steps(), base, scratch);
 }
 
-/// As [`newton_euler_placed`] with given bodies and the acceleration of the base (minus gravity).
+/// Like [`newton_euler_placed`], with given bodies and a given acceleration of the base (minus gravity).
 #[inline(always)]
 pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
     steps: &[JointStep],
@@ -182,7 +182,7 @@ pub(crate) fn outward<T: Scalar>(
     outward_of((model.steps(), model.steps(), base), hinges, motions, wrenches, dq, ddq);
 }
 
-/// As [`outward`] with given bodies.
+/// Like [`outward`], with given bodies.
 #[inline(always)]
 fn outward_of<T: Scalar, B: Bodies<T>>(
     (steps, bodies, base): (&[JointStep], B, Vec3<T>),
@@ -223,8 +223,8 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
     }
 }
 
-/// A body that rotates about an axis at rest: its motion from the acceleration minus gravity in its frame, and the
-/// only relevant part of its wrench, the moment about the axis.
+/// A body that rotates about an axis at rest. Computes its motion from the acceleration minus gravity in its frame,
+/// and the only relevant part of its wrench, the moment about the axis.
 #[inline(always)]
 fn about_resting_axis<T: Scalar>(
     bodies: impl Bodies<T>,
@@ -267,8 +267,9 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> 
     LinkMotion { omega, alpha, acceleration, spin }
 }
 
-/// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x entry is `Γ_z Σ_y - Γ_y Σ_z`
-/// (and so on) with the rows of Γ and Σ. Differences of Γ's diagonal are computed as sums that need no products.
+/// Wrench of a body: `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x entry is `Γ_z
+/// Σ_y - Γ_y Σ_z` (y and z likewise) with the rows of Γ and Σ. Differences of Γ's diagonal entries are computed as
+/// sums that need no products.
 #[inline(always)]
 fn wrench<T: Scalar>(is_rotary: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
     let g = &motion.spin.0;

@@ -5,8 +5,8 @@ use crate::sample_lanes::put_lanes;
 use dynident_lanes::{AlignedBuffer, Lane};
 use dynident_model::Model;
 
-/// A square matrix over the joints for each of several samples, for example the mass matrix: stored by entry; every
-/// entry is a row of samples that begins a cache line.
+/// A square matrix over the joints for each of several samples, for example the mass matrix. It is stored by entry:
+/// every entry is a row of samples that begins on a cache line.
 ///
 /// Entries of joints on different branches are always zero (704 of 1024 for a humanoid of 32 joints). They are zeroed
 /// once, when the array is created, and never written again.
@@ -66,11 +66,13 @@ impl JointMatrices {
         &self.values.as_slice()[(row * self.dof + column) * self.stride..][..self.samples]
     }
 
-    /// Destination for `samples` samples. Memory is reused for the same number; unwritten entries are zero.
+    /// Prepares the array for `samples` samples. Memory is reused if the number does not change; entries that are not
+    /// written are zero.
     pub(crate) fn resize(&mut self, model: &Model, samples: usize) -> MatrixRows<'_> {
         let same = same_tree(&self.parents, model) && self.is_coupled == model.coupling().is_some();
         assert!(same && self.dof == model.dof(), "the matrices were made for a model with another tree");
-        // Whole lanes, and an odd number of cache lines, so that entries do not map to the same cache sets.
+        // A whole number of lanes, and an odd number of cache lines, so that entries do not map to the same cache
+        // sets.
         let stride = 8 * (samples.div_ceil(8) | 1);
         if stride != self.stride {
             self.stride = stride;

@@ -1,8 +1,9 @@
 //! **Rigid-body dynamics**: inverse and forward dynamics, torque regressor and base parameters.
 //!
-//! Free functions named after the quantity, with an immutable [`Model`](dynident_model::Model) and a per-thread
-//! [`Workspace`]. They do not allocate once the workspace exists. Each algorithm is written once over a scalar trait
-//! and runs on one sample, on lanes of samples, and on dual numbers (the oracle of the tests).
+//! The interface consists of free functions named after the quantity that they compute. They use an immutable
+//! [`Model`](dynident_model::Model) and a [`Workspace`] per thread, and do not allocate once the workspace exists.
+//! Each algorithm is written once over a scalar trait. It runs on one sample, on several samples in SIMD lanes, and
+//! on dual numbers (the oracle of the tests).
 //!
 //! | quantity | function | algorithm |
 //! | --- | --- | --- |
@@ -13,7 +14,7 @@
 //! | torque of gravity, its derivative, energies | [`gravity_torque`], [`gravity_torque_derivative`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a custom scalar | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; several samples: [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
-//! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, with `M = LᵀL` along the tree |
+//! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from the derivatives of the torque, with `M = LᵀL` along the tree |
 //! | poses of the bodies, Jacobian of a point | [`body_placements`], [`point_jacobian`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
 //! | regressor of selected columns, several samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |

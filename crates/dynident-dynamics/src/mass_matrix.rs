@@ -34,7 +34,7 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
     &matrices[0]
 }
 
-/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree.
+/// Computes [`mass_matrix`] of every sample. Entries of joints on different branches stay zero.
 ///
 /// Allocation-free once `out` has grown to the number of samples, except for robots with coupled joints.
 ///
@@ -131,12 +131,12 @@ pub(crate) fn matrix_of_sample<T: Lane>(
     }
 }
 
-/// Samples `at..` of `out` from placed hinges; lanes are samples.
+/// Writes samples `at..` of `out` from placed hinges; each SIMD lane is one sample.
 ///
 /// A joint's subtree is one rigid body with first moment `h` and second moment Σ about the origin of the joint's
-/// frame. Unit acceleration along (about) z needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column.
-/// Its projection on the axis of every ancestor joint is an entry of the matrix. Columns, and moments along a chain,
-/// stay in registers.
+/// frame. Unit acceleration along (about) z needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`: the column of the
+/// joint. Its projection on the axis of every ancestor joint is an entry of the matrix. Columns, and moments along a
+/// chain, stay in registers.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
     steps: &[JointStep],
@@ -185,7 +185,7 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
     }
 }
 
-/// As [`composite_rigid_bodies`] for one sample, into the rows of `columns`, with several columns per bundle.
+/// Like [`composite_rigid_bodies`] for one sample, into the rows of `columns`, with several columns per bundle.
 #[inline(always)]
 fn composite_rigid_bodies_in_bundles<T: Lane>(
     model: &Model,

@@ -8,8 +8,8 @@ use crate::workspace::{AnyScratch, Scratch, Workspace};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 
-/// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
-/// τ`.
+/// Computes the mass matrix `M(q)` (row-major, dof × dof) and the bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid
+/// bodies: `M q̈ + bias = τ`.
 ///
 /// The same values as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics()) with
 /// zero acceleration, with the joint transforms computed once. Allocation-free.

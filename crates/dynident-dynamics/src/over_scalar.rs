@@ -5,8 +5,8 @@ use crate::workspace::CoreScratch;
 use dynident_lanes::Scalar;
 use dynident_model::Model;
 
-/// [`inverse_dynamics`](crate::inverse_dynamics()) over any [`Scalar`]: `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the
-/// rigid bodies, one entry per joint. Allocates its scratch, so it is not suitable for control loops.
+/// Computes [`inverse_dynamics`](crate::inverse_dynamics()) over any [`Scalar`]: `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)`
+/// of the rigid bodies, one entry per joint. Allocates its scratch memory, so it is not suitable for control loops.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints.
@@ -28,7 +28,8 @@ pub fn inverse_dynamics_over<T: Scalar>(model: &Model, q: &[T], dq: &[T], ddq: &
     tau
 }
 
-/// [`mass_matrix`](crate::mass_matrix()) over any [`Scalar`]: `M(q)`, row-major, dof × dof. Allocates its scratch.
+/// Computes [`mass_matrix`](crate::mass_matrix()) over any [`Scalar`]: `M(q)`, row-major, dof × dof. Allocates its
+/// scratch memory.
 ///
 /// # Panics
 /// If `q` does not have one entry per joint.

@@ -1,6 +1,6 @@
-//! Change of frame over one joint in the bodies' own frames, like [`crate::hinge`] for inner frames. If the joint axis
-//! is an axis of both its frame and the parent's, the rotation changes two entries of a vector and copies the third:
-//! five products instead of nine.
+//! Change of frame over one joint in the bodies' own frames, like [`crate::hinge`] for inner frames. If the joint
+//! axis is a coordinate axis of both its frame and the parent's, the rotation changes two entries of a vector and
+//! copies the third: five products instead of nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointMap, Mat3, Vec3};
@@ -16,9 +16,9 @@ pub(crate) trait OwnTurn<T: Scalar>: Copy {
 /// A joint whose axis is axis `PARENT` of the parent's frame and axis `CHILD` of its own.
 #[derive(Clone, Copy)]
 pub(crate) struct Along<T, const PARENT: usize, const CHILD: usize> {
-    /// Entries of the other two rows and columns.
+    /// Entries of the rotation in the other two rows and columns.
     pub(crate) block: [[T; 2]; 2],
-    /// Plus or minus one.
+    /// Entry of the rotation along the axis, plus or minus one.
     pub(crate) across: T,
     /// Direction of the axis along `CHILD`: plus or minus one.
     pub(crate) axis: T,

@@ -13,15 +13,15 @@ pub enum ParametricModelError {
     /// A program added a torque term for a joint number that the robot does not have. Joint numbers start at 0.
     #[error("torque term {term}: the joint does not exist (the model has {joints} joints)")]
     NoSuchJoint {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// Joints of the model.
+        /// Number of joints of the robot.
         joints: usize,
     },
     /// A coupling of joints has a ratio that is zero, too small or too large. Check the ratio and its units.
     #[error("coupling {term}: ratio {ratio} is out of range: use magnitudes from 1e-6 to 1e6")]
     Ratio {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
         /// The ratio.
         ratio: f64,
@@ -29,11 +29,11 @@ pub enum ParametricModelError {
     /// The expression of a `[[torque]]` uses a joint number that the robot does not have. Correct the number.
     #[error("torque {term}: joint number {joint} does not exist (the model has {joints} joints)")]
     FollowsNoJoint {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// The joint's number, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// Joints of the model.
+        /// Number of joints of the robot.
         joints: usize,
     },
     /// The expression or function of a `[[torque]]` has no value at a position and velocity that the joint limits
@@ -42,20 +42,20 @@ pub enum ParametricModelError {
         "torque {term} = {law}: no value at {at}, which is inside the joints' limits: keep the arguments of roots, logarithms and divisions valid, for example with max(.., 0), or narrow the limits"
     )]
     Undefined {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// Its expression.
+        /// Expression of the torque.
         law: String,
-        /// Positions and velocities.
+        /// Positions and velocities at which the expression has no value.
         at: String,
     },
     /// The expression of a `[[torque]]` is zero at all positions and velocities within the joint limits, so that its
     /// coefficient cannot be identified.
     #[error("torque {term} = {law}: this torque is zero (below 1e-9) within the joint limits: remove its [[torque]]")]
     Nothing {
-        /// The term's symbol.
+        /// Symbol of the term.
         term: String,
-        /// Its expression.
+        /// Expression of the torque.
         law: String,
     },
     /// The `name` of a `[[torque]]` has an invalid character, is too long, or is the name of another parameter. Rename
@@ -70,7 +70,7 @@ pub enum ParametricModelError {
     /// A program passed a list of nominal parameters of the wrong length. Pass one value for each parameter.
     #[error("wrong number of nominal parameters: expected {expected}, found {found}")]
     NominalLength {
-        /// Ten per body and one per term.
+        /// Expected number of parameters: ten per body and one per term.
         expected: usize,
         /// Number given.
         found: usize,
@@ -87,9 +87,9 @@ pub enum ParametricModelError {
 /// A model with its torque terms (friction, drives, offsets), base parameters, regressor layout, and nominal values of
 /// all parameters.
 ///
-/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`: `π` contains ten inertial parameters
-/// per body (base to tip) and one value per term, `θ = B π` are the base parameters ([`BaseParameters`]). Create it
-/// once per robot; everything that needs rows, values or symbols uses it.
+/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`. π contains ten inertial parameters
+/// per body (base to tip) and one value per term. `θ = B π` are the base parameters ([`BaseParameters`]), and Y and W
+/// the regressors of π and θ. Create it once per robot, and take regressor rows, nominal values and symbols from it.
 ///
 /// ```
 /// use dynident_dynamics::ParametricModel;
@@ -159,8 +159,8 @@ impl ParametricModel {
         Ok(self)
     }
 
-    /// The same robot with other torque terms. Keeps the nominal values of bodies and remaining terms; those of new
-    /// terms come from the robot description.
+    /// The same robot with other torque terms. Nominal values of bodies and remaining terms are kept; nominal values
+    /// of new terms come from the robot description.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -177,8 +177,8 @@ impl ParametricModel {
         Ok(other)
     }
 
-    /// Adds terms after the base columns of the layout, even if they depend on these: one set of rows for term
-    /// selection. Base parameters and terms do not change.
+    /// Adds terms after the base columns of the layout, even if they depend on these columns, so that one set of rows
+    /// is sufficient for selecting terms. Base parameters and terms do not change.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut columns = self.base.base_columns();

@@ -1,10 +1,10 @@
 //! The torque regressor of the bodies: joint torques as a linear function of the inertial parameters.
 //!
-//! Row `j`, block of body `i` (a body moved by joint `j`): power of the body's wrench on the joint's axis, `Y_ji =
-//! e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3 × 10)
-//! are moment and force of the body as functions of its ten parameters. Axes are transformed outward from frame to
-//! frame with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial
-//! arm costs one small rotation and one 6 × 10 product per pair.
+//! Row `j`, block of body `i` (a body that joint `j` moves): power of the body's wrench along the joint's axis, `Y_ji
+//! = e_jᵀ N_i + l_jᵀ F_i`. `(e_j, l_j)` is the axis as a twist at the frame of body `i`; `N_i` and `F_i` (3 × 10) are
+//! moment and force of the body as functions of its ten parameters. Axes are transformed outward from frame to frame
+//! with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial arm
+//! costs one small rotation and one 6 × 10 product per pair.
 
 use crate::hinge::{minus_cross_shift, times_shift};
 use crate::own_turn::{OwnTurn, bundles, with_own_turn};
@@ -15,9 +15,9 @@ use crate::workspace::{AnyScratch, CoreScratch, Workspace};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
 use dynident_model::{Mat3, Model, Vec3};
 
-/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·bodies columns: column `10 i + k` is parameter
-/// `k` of body `i` in the order of [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Nm (N) per unit of the
-/// parameter. Does not depend on the model's own inertial parameters.
+/// Computes the regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·bodies columns: column `10 i + k`
+/// is parameter `k` of body `i` in the order of [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Unit: Nm (N) per
+/// unit of the parameter. Does not depend on the model's own inertial parameters.
 ///
 /// Allocation-free.
 ///
@@ -38,7 +38,7 @@ pub fn torque_regressor<'w>(
         tree.take_motion(coupling, q, dq, ddq);
         let TreeScratch { q, dq, ddq, regressor: out, .. } = tree;
         dispatch_single(*level, Single { model, scratch, q, dq, ddq, out });
-        // A row is treated like samples of one joint: ten values per body.
+        // One row is treated like the samples of one joint, with ten values per body.
         regressor.fill(0.0);
         coupling.add_projected(&tree.regressor, 10 * model.body_count(), regressor);
     } else {
@@ -96,7 +96,7 @@ impl<T: Lane> BlockSink<T> for DenseRows<'_> {
             let (w6, w7) = (work.of::<6>(), work.of::<7>());
             let middle = T::Bundle::transposed([work.of::<4>(), work.of::<5>(), w6, w7]);
             let last = T::Bundle::transposed([w6, w7, work.of::<8>(), work.of::<9>()]);
-            // Unrolled, because a loop would first write all of them to memory.
+            // Unrolled, because a loop would first write all entries to memory.
             macro_rules! rows {
                 ($($place:literal)*) => {
                     $(if let Some(&joint) = joints.get($place) {
@@ -219,7 +219,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
     }
 }
 
-/// `[α]× + [ω]× [ω]×`.
+/// `[α]× + [ω]× [ω]×`: maps a point of the body to its acceleration relative to the origin.
 #[inline(always)]
 fn spin<T: Scalar>(omega: Vec3<T>, alpha: Vec3<T>) -> Mat3<T> {
     let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
@@ -231,10 +231,10 @@ fn spin<T: Scalar>(omega: Vec3<T>, alpha: Vec3<T>) -> Mat3<T> {
 /// A body's wrench as a function of its ten parameters at one motion, in the fewest values, so that they stay in
 /// registers for all joints of a batch.
 struct WrenchBasis<B> {
-    /// Acceleration of the origin minus gravity: the force of a unit mass.
+    /// Acceleration of the origin minus gravity: the force per unit of mass.
     acceleration: Vec3<B>,
     alpha: Vec3<B>,
-    /// `[α]× + [ω]× [ω]×`: force of a first moment.
+    /// `[α]× + [ω]× [ω]×`: the force per unit of the first moment.
     spin: Mat3<B>,
     /// `ω_y ω_z, ω_x ω_z, ω_x ω_y`.
     products: Vec3<B>,
@@ -285,13 +285,13 @@ impl<B: Lane> WrenchBasis<B> {
     }
 }
 
-/// Power of a body's wrench on a twist, by parameter.
+/// Power of a body's wrench on a twist, for each parameter.
 pub(crate) trait Entries<B> {
     /// Power per unit of parameter `PARAMETER`.
     fn of<const PARAMETER: usize>(&self) -> B;
 }
 
-/// For any twist.
+/// Power on any twist.
 struct Work<'a, B> {
     wrench: &'a WrenchBasis<B>,
     angular: Vec3<B>,
@@ -334,7 +334,7 @@ impl<B: Lane> Entries<B> for Work<'_, B> {
     }
 }
 
-/// For a rotation about axis `AXIS` of the body's frame.
+/// Power on a rotation about axis `AXIS` of the body's frame.
 struct OwnWork<'a, B, const AXIS: usize> {
     wrench: &'a WrenchBasis<B>,
     /// Plus or minus one.

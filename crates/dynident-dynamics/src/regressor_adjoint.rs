@@ -1,11 +1,11 @@
-//! Reverse sweep of the torque regressor: derivatives of a cost by the motion from its derivatives by every regressor
-//! entry.
+//! Reverse sweep of the torque regressor: converts derivatives of a cost with respect to every regressor entry into
+//! derivatives with respect to the motion.
 //!
-//! With the derivatives `V` by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i + l_jᵀ
-//! F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). In reverse, every pair contributes to
-//! the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`. The contributions are then transformed inward from
-//! frame to frame; the changes by each joint's motion give the derivative by its position. One sweep gives all
-//! derivatives at about twice the cost of the regressor.
+//! With the derivatives `V` with respect to the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ
+//! N_i + l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). In reverse, every pair
+//! contributes to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`. The contributions are then transformed
+//! inward from frame to frame; the contribution to each joint's motion gives the derivative with respect to its
+//! position. One sweep gives all derivatives at about twice the cost of the regressor.
 
 use crate::body_frames::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
@@ -17,20 +17,20 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
-/// Derivatives of a cost by the motion of a block, joint-major.
+/// Derivatives of a cost with respect to the motion of a block of samples, joint-major.
 #[derive(Debug)]
 pub struct MotionGradient<'a> {
-    /// By the positions.
+    /// Derivatives with respect to positions.
     pub by_q: &'a mut [f64],
-    /// By the velocities.
+    /// Derivatives with respect to velocities.
     pub by_dq: &'a mut [f64],
-    /// By the accelerations.
+    /// Derivatives with respect to accelerations.
     pub by_ddq: &'a mut [f64],
 }
 
-/// Adds the derivatives of a cost by the motion to `gradient`. `adjoint` contains the derivatives by every regressor
-/// entry in the shape of [`regressor_panels`](crate::regressor_panels()) (torque columns are not read). Exact;
-/// includes terms.
+/// Adds the derivatives of a cost with respect to the motion to `gradient`. `adjoint` contains the derivatives with
+/// respect to every regressor entry in the shape of [`regressor_panels`](crate::regressor_panels()) (torque columns
+/// are not read). The result is exact and includes the terms.
 ///
 /// Allocation-free.
 ///
@@ -129,7 +129,7 @@ fn add_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
     }
 }
 
-/// Derivatives of the cost by the regressor.
+/// Derivatives of the cost with respect to the regressor.
 struct Source<'a> {
     layout: &'a PanelLayout,
     adjoint: &'a Panels,
@@ -137,8 +137,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns
-    /// outside the layout and for lanes past the end.
+    /// Derivatives with respect to the ten entries of body `body` in the row of the `k`-th joint on its path; zero
+    /// for columns outside the layout and for lanes past the end.
     #[inline(always)]
     fn block<T: Lane>(&self, body: usize, k: usize, joint: usize) -> [T; 10] {
         let samples = self.adjoint.samples();
@@ -198,7 +198,7 @@ fn reverse_sweep<T: Lane>(
                 &mut share,
             );
         }
-        // Inward: contributions of the joint's position and rates.
+        // Inward: contributions to the joint's position, velocity and acceleration.
         let axis = map.axis.splat::<T>();
         let rate = axis.scale(core.dq[index]);
         let Transform { rotation, translation } = &body.parent_from_body;
@@ -285,8 +285,8 @@ fn place_axes<T: Lane>(
     }
 }
 
-/// One body and one axis: with the weights as the body's ten parameters, the axis receives their wrench, and the
-/// body's motion the derivative of the wrench's power on the axis.
+/// Contribution of one body and one axis. With the weights as the body's ten parameters, the axis receives their
+/// wrench; the body's motion receives the derivative of this wrench's power along the axis.
 #[inline(always)]
 fn pair_share<T: Scalar>(
     weights: &[T; 10],

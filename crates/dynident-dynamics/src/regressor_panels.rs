@@ -1,4 +1,4 @@
-//! The regressor of blocks of samples by joint, as input of the triangular factors.
+//! The regressor of blocks of samples, one panel per joint: the input of the triangular factors.
 //!
 //! A joint's row has entries only for the bodies that it moves and for its terms, so each joint has a separate, narrow
 //! panel: one column after the other, with one value per sample. The full regressor is never stored.
@@ -28,7 +28,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// Symbol of the parameter with the body's or joint's number from 1: `m2`, `mx2`, `Izz1`, `fv3`.
+    /// Symbol of the parameter, with the body's or joint's number counted from 1: `m2`, `mx2`, `Izz1`, `fv3`.
     pub fn symbol(&self) -> String {
         match self {
             Self::Body { body, parameter } => format!("{}{}", INERTIAL_NAMES[*parameter], body + 1),
@@ -69,12 +69,12 @@ pub struct PanelLayout {
     coupled: Option<Box<CoupledPanels>>,
 }
 
-/// Panels for robots with coupled joints: panels of the joints of the tree, and their contributions to the columns of
-/// the degrees of freedom.
+/// Panels for robots with coupled joints: panels of the tree's joints, and their contributions to the columns of the
+/// degrees of freedom.
 #[derive(Clone, Debug)]
 struct CoupledPanels {
     coupling: JointCoupling,
-    /// Bodies' columns of the joints of the tree.
+    /// Columns of the bodies for the tree's joints.
     tree: PanelLayout,
     shares: Vec<ColumnShare>,
 }
@@ -92,7 +92,7 @@ struct ColumnShare {
 #[derive(Clone, Debug, Default)]
 struct JointPanel {
     columns: Vec<usize>,
-    /// Terms: place in the panel, and index of the global column.
+    /// Terms: position in the panel, and index of the global column.
     terms: Vec<(usize, usize)>,
 }
 
@@ -213,8 +213,9 @@ impl PanelLayout {
         }
     }
 
-    /// Layout of the tree joints and, in `room`, the derivatives of a cost by their panel entries from those of the
-    /// degrees of freedom (the adjoint of [`gather`](Self::gather)). `None` without coupled joints.
+    /// Layout of the tree's joints. Writes to `room` the derivatives of a cost with respect to their panel entries,
+    /// from the derivatives for the degrees of freedom (the adjoint of [`gather`](Self::gather)). `None` without
+    /// coupled joints.
     pub(crate) fn scattered<'l>(&'l self, panels: &Panels, room: &mut Panels) -> Option<&'l PanelLayout> {
         let coupled = self.coupled.as_ref()?;
         let samples = panels.samples;
@@ -233,8 +234,8 @@ impl PanelLayout {
         Some(&coupled.tree)
     }
 
-    /// Bits of the parameters of `body` with columns, and the position of the first of these consecutive columns in
-    /// the panel of the `k`-th joint on its path.
+    /// Bits of the parameters of `body` that have columns, and the position of the first of these consecutive columns
+    /// in the panel of the `k`-th joint on its path.
     #[inline(always)]
     pub(crate) fn body_columns(&self, body: usize, k: usize) -> (u16, usize) {
         (self.parameters[body], self.places[self.place_start[body] + k])
@@ -242,7 +243,7 @@ impl PanelLayout {
 }
 
 /// Panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one after
-/// the other; the last one is for the joint's torque and is not written here.
+/// the other. The last column is for the joint's torque; the regressor functions do not write it.
 #[derive(Debug, Default)]
 pub struct Panels {
     samples: usize,
@@ -267,7 +268,7 @@ impl Panels {
         }
     }
 
-    /// Samples in the block.
+    /// Number of samples in the block.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -308,11 +309,12 @@ pub fn regressor_panels(
     regressor_panels_following(model, workspace, layout, motion, &mut TermHistory::default(), panels);
 }
 
-/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: `history` provides
-/// the memory of terms, the load of load-dependent terms, and temperatures.
+/// Computes [`regressor_panels`](regressor_panels()) of a block that follows earlier blocks of the same recording.
+/// `history` provides the state of hysteresis terms, the transmitted torque for load-dependent terms, and
+/// temperatures.
 /// # Panics
-/// As [`regressor_panels`](regressor_panels()), or if the number of load parameters differs from the number of columns.
-/// Temperatures are ignored unless there are joints × samples of them.
+/// As [`regressor_panels`](regressor_panels()), or if the number of load parameters differs from the number of
+/// columns. Temperatures are ignored unless there are joints × samples of them.
 pub fn regressor_panels_following(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -340,8 +342,8 @@ pub fn regressor_panels_following(
     fill_terms(layout, motion, history, panels);
 }
 
-/// Fills the columns of terms only, like [`regressor_panels_following`]; those of bodies do not change. Load-dependent
-/// terms need the bodies' columns and are zero here.
+/// Fills only the columns of terms, like [`regressor_panels_following`]; columns of bodies do not change.
+/// Load-dependent terms need the columns of the bodies and are zero here.
 ///
 /// # Panics
 /// If an array's length is not joints × samples.
@@ -359,8 +361,8 @@ pub fn term_panels_following(
     history.load_parameters = load_parameters;
 }
 
-/// [`regressor_panels_following`] for a single sample: equal to rounding, in less than half the time of a block of one
-/// sample.
+/// Computes [`regressor_panels_following`] for a single sample. The result is equal up to rounding and takes less
+/// than half the time of a block of one sample.
 ///
 /// # Panics
 /// As [`regressor_panels_following`], or if the motion has more than one sample.
@@ -387,7 +389,7 @@ pub fn regressor_panels_of_sample(
     fill_terms(layout, motion, history, panels);
 }
 
-/// Fills the columns of terms; those of bodies must be filled before.
+/// Fills the columns of terms; the columns of bodies must be filled before.
 fn fill_terms(layout: &PanelLayout, motion: &JointMotion<'_>, history: &mut TermHistory, panels: &mut Panels) {
     let samples = motion.samples;
     if history.temperature_c.len() != layout.dof() * samples {
@@ -414,7 +416,7 @@ fn fill_terms(layout: &PanelLayout, motion: &JointMotion<'_>, history: &mut Term
     }
 }
 
-/// Torque of the bodies on one joint.
+/// Torque of the bodies on one joint, for load-dependent terms.
 fn load_of(
     columns: &[Column],
     panel: &JointPanel,
@@ -451,8 +453,8 @@ impl Kernel for Fill<'_> {
         let scratch = scratch.of::<T>();
         let samples = motion.samples;
         for group in (0..samples).step_by(T::LANES) {
-            // The last group of a block is shifted back over finished samples, which get the same values, so that all
-            // groups are full.
+            // The last group of a block is shifted back over finished samples, so that all groups are full. The
+            // finished samples get the same values again.
             let at = group.min(samples.saturating_sub(T::LANES));
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
@@ -467,7 +469,8 @@ struct IntoPanels<'a> {
     layout: &'a PanelLayout,
     panels: &'a mut Panels,
     at: usize,
-    /// Bits of the body's parameters with columns, and the first columns in the panels of the joints on its path.
+    /// Bits of the body's parameters that have columns, and the first columns in the panels of the joints on its
+    /// path.
     present: u16,
     places: &'a [usize],
 }
@@ -481,7 +484,7 @@ impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
 
     #[inline(always)]
     fn put(&mut self, _body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
-        // Lanes are samples here, so a bundle is one joint.
+        // Here the lanes are samples, so a bundle contains one joint.
         let samples = self.panels.samples;
         let present = self.present;
         let start = self.places[bundle] * samples + self.at;

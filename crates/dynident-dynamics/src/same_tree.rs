@@ -1,4 +1,4 @@
-//! Check that data for one model fit another model with the same tree.
+//! Check that data for one model are valid for another model: both must have the same tree.
 
 use dynident_model::Model;
 

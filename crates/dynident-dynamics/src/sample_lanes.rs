@@ -10,7 +10,7 @@ pub(crate) fn take<T: Lane>(to: &mut [T], from: &[f64]) {
     }
 }
 
-/// Copies samples `at..at + LANES` of a joint-major array into scratch lanes; past the end the last sample repeats.
+/// Copies samples `at..at + LANES` of a joint-major array into lanes; past the end the last sample repeats.
 #[inline(always)]
 pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at: usize) {
     if at + T::LANES <= samples {
@@ -29,7 +29,7 @@ pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at
     }
 }
 
-/// Writes lanes to samples `at..` of a row; lanes past its end are dropped.
+/// Writes lanes to samples `at..` of a row; lanes past the end of the row are dropped.
 #[inline(always)]
 pub(crate) fn put_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
     if at + T::LANES <= row.len() {

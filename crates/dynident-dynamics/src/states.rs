@@ -51,7 +51,7 @@ impl<T: Scalar> LinkMotion<T> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkWrench<T> {
     pub(crate) force: Vec3<T>,
-    /// About the frame's origin.
+    /// Moment about the frame's origin.
     pub(crate) moment: Vec3<T>,
 }
 
@@ -59,14 +59,14 @@ impl<T: Scalar> LinkWrench<T> {
     pub(crate) const ZERO: Self = Self { force: Vec3::ZERO, moment: Vec3::ZERO };
 }
 
-/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force =
-/// couplingᵀ α + mass a`; with the data for its joint.
+/// Articulated-body inertia of a subtree about the frame of its root body: `moment = rotation α + coupling a`, `force
+/// = couplingᵀ α + mass a`. Also contains the data for the joint of that body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArticulatedInertia<T> {
-    /// Symmetric; upper triangle by rows.
+    /// Symmetric 3 × 3 matrix; upper triangle by rows.
     pub(crate) rotation: [T; 6],
     pub(crate) coupling: Mat3<T>,
-    /// Symmetric; upper triangle by rows.
+    /// Symmetric 3 × 3 matrix; upper triangle by rows.
     pub(crate) mass: [T; 6],
     /// Column of the articulated inertia along the joint, in the parent's frame: (moment, force). Not set at the base.
     pub(crate) column: (Vec3<T>, Vec3<T>),

@@ -1,4 +1,5 @@
-//! State of terms between blocks: memory of earlier blocks, load and temperature.
+//! State of terms between blocks: hysteresis of earlier blocks, parameters for the transmitted torque, and
+//! temperature.
 
 use dynident_model::terms::HysteresisState;
 
@@ -6,9 +7,9 @@ use dynident_model::terms::HysteresisState;
 /// [`regressor_panels_following`](crate::regressor_panels_following).
 #[derive(Clone, Debug, Default)]
 pub struct TermHistory {
-    /// One per column of the layout, once a term with memory occurred.
+    /// Hysteresis state of each column of the layout, once a term with hysteresis occurred.
     pub(crate) memories: Vec<HysteresisState>,
-    /// One value per column of the layout; those of bodies determine the load.
+    /// One value per column of the layout; the values of body columns determine the transmitted torque.
     pub(crate) load_parameters: Option<Vec<f64>>,
     pub(crate) load: Vec<f64>,
     /// Temperatures of the next block, joint-major, °C; may be empty.
@@ -16,9 +17,10 @@ pub struct TermHistory {
 }
 
 impl TermHistory {
-    /// Starts a recording. `load_parameters`, one value per column of the layout, come from an earlier estimate: the
-    /// load of joint j is the torque of the bodies, `τ_load = Σ_body columns W_j θ`, Nm (N). Values at the terms'
-    /// columns are not read. Without them, the columns of load-dependent friction are zero.
+    /// Starts a recording. `load_parameters`, one value per column of the layout, come from an earlier estimate. They
+    /// determine the transmitted torque of load-dependent friction at joint j, the torque of the bodies, `τ_load =
+    /// Σ_body columns W_j θ`, Nm (N). Values at the terms' columns are not read. Without `load_parameters`, the
+    /// columns of load-dependent friction are zero.
     pub fn new(load_parameters: Option<Vec<f64>>) -> Self {
         Self { load_parameters, ..Self::default() }
     }
@@ -30,7 +32,7 @@ impl TermHistory {
         self.temperature_c.extend_from_slice(temperature_c);
     }
 
-    /// The memory of each column of the layout, for storage; empty before a term with memory occurred.
+    /// The hysteresis state of each column of the layout, for storage; empty before a term with hysteresis occurred.
     pub fn memories(&self) -> &[HysteresisState] {
         &self.memories
     }
@@ -40,7 +42,7 @@ impl TermHistory {
         self.memories = memories;
     }
 
-    /// Clears the memory: the next block starts a recording.
+    /// Clears the hysteresis state: the next block starts a recording.
     pub fn restart(&mut self) {
         self.memories.iter_mut().for_each(HysteresisState::restart);
     }

@@ -1,6 +1,6 @@
-//! Scratch for robots with coupled joints. The algorithms run over the joints of the tree: motions are converted from
-//! the degrees of freedom by `q_tree = G q + q_0` and results back by `tau = Gᵀ tau_tree` ([`JointCoupling`]). Empty
-//! and unused for other robots.
+//! Scratch memory for robots with coupled joints. The algorithms run over the joints of the tree: motions are
+//! converted from the degrees of freedom by `q_tree = G q + q_0`, and torques back by `tau = Gᵀ tau_tree`
+//! ([`JointCoupling`]). Empty and unused for other robots.
 
 use crate::joint_matrices::MatrixRows;
 use dynident_lanes::AlignedBuffer;
@@ -45,12 +45,12 @@ impl TreeScratch {
     }
 }
 
-/// Scratch for blocks of samples; grows to their size.
+/// Scratch memory for blocks of samples; grows to their size.
 #[derive(Debug, Default)]
 pub(crate) struct TreeBatch {
     /// Positions, velocities, accelerations.
     pub(crate) motion: [Vec<f64>; 3],
-    /// Torques, or derivatives by the motion.
+    /// Torques, or derivatives with respect to the motion.
     pub(crate) results: [Vec<f64>; 3],
     /// Square matrices over the joints of the tree, by entry.
     pub(crate) matrices: [Vec<f64>; 3],

@@ -1,18 +1,18 @@
-//! A body in the base frame with the quantities for derivatives by the joint motion.
+//! A body in the base frame, with the quantities for derivatives with respect to the joint motion.
 
 use crate::ground::{MassMoments, MomentRates, Spatial};
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Transform, Vec3};
 
-/// State of a body for the derivatives of the inverse dynamics, in the base frame. Moments, rates and wrench are first
-/// those of the body, then those of its subtree.
+/// State of a body for the derivatives of the inverse dynamics, in the base frame. Moments, rates and wrench first
+/// refer to the body alone, then to its subtree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VariedBody<T> {
     /// `base_from_body`.
     pub(crate) placement: Transform<T>,
     pub(crate) velocity: Spatial<T>,
-    /// Minus gravity.
+    /// Spatial acceleration minus gravity.
     pub(crate) acceleration: Spatial<T>,
     /// The joint's axis `S` as a twist.
     pub(crate) axis: Spatial<T>,
@@ -38,8 +38,8 @@ impl<T: Scalar> VariedBody<T> {
         wrench: Spatial::ZERO,
     };
 
-    /// Computes placement, axis and inertia from those of `parent` and the joint of `step`, number `index` of the
-    /// hinges.
+    /// Computes placement, axis and inertia from the placement of `parent` and the joint of `step`, which has index
+    /// `index` in the hinges.
     #[inline(always)]
     pub(crate) fn follow(&mut self, parent: &Self, step: &JointStep, index: usize, hinges: &PlacedHinges<'_, T>) {
         let above = &parent.placement;
@@ -51,11 +51,11 @@ impl<T: Scalar> VariedBody<T> {
         self.moments = MassMoments::of(step, &self.placement);
     }
 
-    /// Computes the velocity from that of `parent` and the joint velocity `dq`, with dependent quantities; returns the
-    /// rate of the axis, `Ψ̇ = v × S`.
+    /// Computes the velocity from the velocity of `parent` and the joint velocity `dq`, and the quantities that
+    /// depend on it; returns the rate of the axis, `Ψ̇ = v × S`.
     #[inline(always)]
     pub(crate) fn move_along(&mut self, parent: &Self, dq: T) -> Spatial<T> {
-        // The parent's velocity can be used, because S × S = 0.
+        // The parent's velocity gives the same result, because S × S = 0.
         let rate = parent.velocity.cross(&self.axis);
         self.velocity = self.axis.scale_add(dq, &parent.velocity);
         self.twice_rate = Spatial { angular: rate.angular + rate.angular, linear: rate.linear + rate.linear };

@@ -20,7 +20,7 @@ pub(crate) struct Scratch<T: Lane> {
     pub(crate) adjoint: AdjointScratch<T>,
 }
 
-/// Scratch for any [`Scalar`], including dual numbers.
+/// Scratch memory for any [`Scalar`], including dual numbers.
 #[derive(Debug)]
 pub(crate) struct CoreScratch<T> {
     pub(crate) q: Vec<T>,
@@ -97,11 +97,11 @@ pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: 
     }
 }
 
-/// A scratch whose lane type was selected at run time.
+/// Scratch memory whose lane type was selected at run time.
 pub(crate) struct AnyScratch(Box<dyn Any + Send + Sync>);
 
 impl AnyScratch {
-    /// The scratch of lane type `T`, which must be the type of its creation.
+    /// The scratch memory with lanes of type `T`, which must be the type of its creation.
     #[inline(always)]
     pub(crate) fn of<T: Lane>(&mut self) -> &mut Scratch<T> {
         self.0.downcast_mut().expect("a workspace keeps the processor level that it was made for")
@@ -151,7 +151,7 @@ impl Kernel for MakeScratch<'_> {
     }
 }
 
-/// Scratch memory for one sample at a time. Every thread owns one; the [`Model`] is shared.
+/// Scratch memory for algorithms on one sample. Every thread has one; all threads share the [`Model`].
 ///
 /// Functions with a workspace do not allocate and return slices into it.
 pub struct Workspace {
@@ -218,7 +218,7 @@ impl core::fmt::Debug for Workspace {
     }
 }
 
-/// Scratch memory for lanes of samples. Every thread owns one.
+/// Scratch memory for algorithms on several samples in SIMD lanes. Every thread has one.
 pub struct BatchWorkspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,

@@ -38,20 +38,21 @@ pub struct ChangeGroup {
 /// Settings of [`explanations`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChangeSettings {
-    /// Sizes of changes relative to the expected size, each with the same probability. Default 0.1, 0.3, 1, 3: a change
-    /// may be much smaller than expected, and hardly larger.
+    /// Sizes of changes relative to the expected size, each with the same probability. Default 0.1, 0.3, 1, 3: a
+    /// change can be much smaller than expected, but not much larger.
     pub scales: Vec<f64>,
-    /// Factors of the error bars, each with the same probability. Default 1, 1.5, 2: bars hold on average, and some
-    /// logs have errors that they do not contain.
+    /// Factors of the error bars, each with the same probability. Default 1, 1.5, 2: on average the error bars are
+    /// right, but some logs have errors that the error bars do not include.
     pub error_factors: Vec<f64>,
     /// Prior probability that a group changed. Default 0.05, a change is rare.
     pub probability: f64,
-    /// Largest number of groups that changed together, apart from all of them. Default 2.
+    /// Maximum number of changed groups in one explanation; all groups together are a separate explanation. Default
+    /// 2.
     pub most_groups: usize,
-    /// Number of groups with the best evidence from which sets of several groups are formed. Default 8.
+    /// Number of groups, those with the best evidence, that are combined to sets of several groups. Default 8.
     pub candidates: usize,
-    /// Whether the change of all groups together is an explanation. Default true; false if the covariances already
-    /// contain differences everywhere.
+    /// Whether to test the explanation that all groups changed. Default true; use false if the covariances already
+    /// contain small differences of all groups.
     pub together: bool,
 }
 
@@ -91,7 +92,7 @@ impl ChangeSettings {
 pub struct Explanation {
     /// The groups that changed, ascending; empty if nothing changed.
     pub groups: Vec<usize>,
-    /// Index of the covariance.
+    /// Index of the covariance `C` in the list given to [`explanations`].
     pub covariance: usize,
     /// Posterior probability among the compared explanations.
     pub probability: f64,
@@ -106,9 +107,9 @@ pub struct Explanation {
     pub changes: Vec<(DVector<f64>, DMatrix<f64>)>,
 }
 
-/// Compares explanations of the difference `d` for each covariance `C`: no change, every group, pairs of the most
-/// probable groups, and all groups together. The covariances have the same prior probability. The most probable
-/// explanation is the first.
+/// Compares explanations of the difference `d` for each covariance `C`: no change, a change of each single group,
+/// pairs with the most probable groups, and all groups together. The covariances have the same prior probability. The
+/// most probable explanation comes first.
 ///
 /// # Errors
 /// [`EstimationError::Setting`]; [`EstimationError::Mismatch`] for another size; [`EstimationError::NotPositive`] if
@@ -154,7 +155,7 @@ fn explanations_with(
     let is_finite = |of: &DMatrix<f64>| of.iter().all(|value| value.is_finite());
     let all_finite = groups.iter().all(|group| is_finite(&group.effect)) && difference.iter().all(|d| d.is_finite());
     let factor = Cholesky::new(positive).filter(|_| all_finite && is_finite(covariance)).ok_or_else(not_positive)?;
-    // In units of the error bars: covariance 1.
+    // Scaled by the error bars, so that the covariance is the unit matrix.
     let white = |of: &DMatrix<f64>| factor.l_dirty().solve_lower_triangular(of).ok_or_else(not_positive);
     let d = white(&DMatrix::from_column_slice(n, 1, difference.as_slice()))?.column(0).into_owned();
     let starts: Vec<usize> = groups
@@ -185,7 +186,8 @@ fn explanations_with(
     found.extend(single);
     if settings.most_groups > 1 {
         for (place, &a) in best.iter().enumerate() {
-            // The best groups with any other, because the second change may be visible only after the first.
+            // Combine the best groups with every other group: a second change may be visible only after the first is
+            // explained.
             let others = (0..groups.len()).filter(|b| *b != a && !best[..place].contains(b));
             for b in others {
                 found.push(whitened.explained(&[a.min(b), a.max(b)], prior(2)));
@@ -213,7 +215,7 @@ struct Whitened<'a> {
     settings: &'a ChangeSettings,
     /// Index of the covariance.
     index: usize,
-    /// Half of the logarithm of its determinant.
+    /// Half of the logarithm of the determinant of the covariance.
     log_determinant: f64,
 }
 

@@ -24,9 +24,9 @@ pub enum EstimationError {
         "row {row}, column {column}: {value} cannot be used in a fit (largest magnitude {limit:e}); remove this sample or fix its source"
     )]
     Unusable {
-        /// Row within the rows given, from 0.
+        /// Index of the row among the rows passed, from 0.
         row: usize,
-        /// Column, from 0; the torque is the last one.
+        /// Index of the column, from 0; the torque is the last one.
         column: usize,
         /// The value.
         value: f64,
@@ -72,11 +72,11 @@ pub enum EstimationError {
         "{what}: {rows} rows for {parameters} free parameters are too few to estimate the noise; use a longer log or fewer columns"
     )]
     TooFewRows {
-        /// All rows, or the rows of one joint.
+        /// What the rows belong to: all joints, or one joint.
         what: String,
-        /// Rows.
+        /// Number of rows.
         rows: usize,
-        /// Free parameters that these rows determine; a joint's share need not be whole.
+        /// Number of free parameters that these rows determine; fractional for the share of one joint.
         parameters: f64,
     },
     /// The error bars are computed from the differences between time segments of the logs, and there is only one.
@@ -85,7 +85,7 @@ pub enum EstimationError {
         "too few time segments ({clusters}): a covariance from segments needs at least two; use shorter segments, a longer log or the white-noise covariance"
     )]
     TooFewSegments {
-        /// Segments found.
+        /// Number of segments found.
         clusters: usize,
     },
     /// A program passed different rows for the joints of one log, so that correlations between joints cannot be
@@ -136,8 +136,8 @@ pub enum EstimationError {
         /// Name of the unknown.
         name: String,
     },
-    /// The error bars of the compared results cannot all be correct, because a parameter was not determined. Identify
-    /// from logs with a more exciting motion (`dynident design`).
+    /// The covariance of the compared results is not positive definite, because the logs did not determine a
+    /// parameter. Identify from logs with a more exciting motion (`dynident design`).
     #[error("the {what} is not positive definite; identify both results from logs that excite their parameters")]
     NotPositive {
         /// The covariance.

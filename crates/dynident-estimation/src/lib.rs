@@ -1,8 +1,8 @@
-//! **Estimation from rows `[W | τ]`**: parameters with error bars.
+//! **Estimation from rows `[W | τ]`** of regressor W and torque τ: parameters with error bars.
 //!
-//! The crate works on columns, joints and numbers and knows no robot and no file format. The rows of each joint in
-//! each log are reduced to a [`SegmentedFactor`]. The factors form a [`LinearProblem`] over named columns. An
-//! estimator solves it and returns an [`Estimate`]: values, a covariance that is valid for residuals correlated in
+//! The crate works on columns, joints and numbers; it does not depend on robots or file formats. The rows of each
+//! joint in each log are reduced to a [`SegmentedFactor`]. The factors form a [`LinearProblem`] over named columns.
+//! An estimator solves it and returns an [`Estimate`]: values, a covariance that is valid for residuals correlated in
 //! time, the noise of every joint and the rank decisions for unexcited columns.
 //!
 //! ```

@@ -18,13 +18,14 @@ use serde::{Deserialize, Serialize};
 /// Excess of a ratio above 1 that is a violation.
 pub const VIOLATION: f64 = 1e-6;
 
-/// Rate at which motions of usual arms are checked, Hz. For other sizes use [`CharacteristicScale::round_hertz`], so
-/// that a very small or very large robot is sampled as densely relative to its motion.
+/// Rate at which motions of an arm of usual size are checked, Hz. For other sizes use
+/// [`CharacteristicScale::round_hertz`], so that a very small or very large robot is sampled as densely relative to
+/// its motion.
 ///
 /// [`CharacteristicScale::round_hertz`]: dynident_model::CharacteristicScale::round_hertz
 pub const CHECK_RATE_HZ: f64 = 10_000.0;
 
-/// Maximum number of samples of a check. Bounds the time (some minutes), not the memory.
+/// Maximum number of samples of a check. It bounds the time (some minutes), not the memory.
 const MAX_SAMPLES: f64 = 1e8;
 
 const BLOCK_SAMPLES: usize = 1000;
@@ -35,12 +36,13 @@ const BLOCK_SAMPLES: usize = 1000;
 pub struct LimitReport {
     /// Kind of the limit.
     pub kind: LimitKind,
-    /// Joint; for places the point, for self-collision the pair of links.
+    /// Name of the joint; for place limits the name of the point, for self-collision the names of both links.
     pub joint: String,
-    /// Ratio to the limit: 1 on the limit, larger in violation. `|x - middle| / half range` or `|x| / limit`; for a
-    /// column `2 - distance / minimum distance`; for two links 1 plus the missing distance divided by their radii and
-    /// clearance (at least 5 % of the arm's length); for the floor 1 plus the depth below it in arm lengths. Infinite
-    /// if the motion is not finite; JSON then contains the largest number, 1.8e308.
+    /// Ratio to the limit: 1 on the limit, larger in violation. For a range it is `|x - middle| / half range`, for a
+    /// limit of the magnitude `|x| / limit`, for a column `2 - distance / minimum distance`. For two links it is 1
+    /// plus the missing distance divided by their radii and clearance (at least 5 % of the arm's length), for the
+    /// floor 1 plus the depth below it in arm lengths. Infinite if the motion is not finite; JSON then contains the
+    /// largest number, 1.8e308.
     #[serde(serialize_with = "largest_for_infinite", deserialize_with = "infinite_for_largest")]
     #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub worst_ratio: f64,
@@ -50,7 +52,7 @@ pub struct LimitReport {
     pub violated: bool,
 }
 
-/// Writes an infinite ratio as the largest finite number, because JSON has no infinity.
+/// Writes an infinite ratio as the largest finite number, because JSON cannot represent infinity.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
 fn largest_for_infinite<S: serde::Serializer>(ratio: &f64, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_f64(ratio.min(f64::MAX))
@@ -76,8 +78,8 @@ pub fn check_limits(
     Ok(check_limits_until(limits, model, duration_s, rate_hz, motion, &|| false)?.unwrap_or_default())
 }
 
-/// [`check_limits()`] with duration (s) and rate (Hz) that ends without a report when `stop` returns true. `stop` is
-/// called every 1000 samples.
+/// Like [`check_limits()`] with duration (s) and rate (Hz), but ends without a report when `stop` returns true.
+/// `stop` is called every 1000 samples.
 ///
 /// # Errors
 /// As [`check_limits()`].

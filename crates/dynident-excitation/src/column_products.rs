@@ -81,7 +81,7 @@ impl Kernel for Gram<'_> {
     }
 }
 
-/// Four columns from `first`. Past the end the last column repeats, and its sums are not used.
+/// Four columns starting at `first`. Past the end the last column repeats, and its sums are not used.
 #[inline(always)]
 fn column_tile(panel: &[f64], rows: usize, first: usize, count: usize) -> [&[f64]; TILE] {
     let of = |k: usize| {

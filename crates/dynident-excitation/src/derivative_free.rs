@@ -1,5 +1,5 @@
-//! Design by optimisers without derivatives, for comparison: the genetic algorithm of the paper and CMA-ES, with
-//! penalties for violated limits.
+//! Design by optimisers without derivatives, for comparison: the binary genetic algorithm of *Iterative
+//! Identification of Robot Dynamic Parameters Based on Logistic Function*, and CMA-ES. Violated limits add penalties.
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
@@ -25,30 +25,32 @@ pub enum DerivativeFree {
     CmaEs(CmaEsSettings),
 }
 
-/// Fitness penalty per unit of violation, and for a motion that does not excite every parameter.
+/// Fitness penalty per unit of violation; also the penalty of a motion that does not excite every parameter.
 const VIOLATION_PENALTY: f64 = 1000.0;
 
-/// Initial margin at the samples for peaks between them, as a share of each limit.
+/// Initial margin, as a share of each limit, at the samples of the search, because the motion between samples can
+/// exceed them.
 const INITIAL_MARGIN: f64 = 0.005;
 
-/// Maximum number of searches; each further one has wider margins.
+/// Maximum number of searches; each further search has wider margins.
 const MAX_SEARCHES: usize = 3;
 
 const ROUND_NAME: &str = "generations";
 
-/// Number of random starts that determine the box of the parameters, and the factor by which the box is widened.
+/// Number of random starts that determine the search range (box) of the parameters, and the factor by which the range
+/// is widened.
 const BOX_STARTS: usize = 100;
 const BOX_WIDENING: f64 = 1.3;
 
-/// Solves the task of [`design`](crate::design()) without gradients: minimises the [`fitness`](Criterion::fitness) of
+/// Solves a task of [`design`](crate::design()) without gradients: minimises the [`fitness`](Criterion::fitness) of
 /// the last criterion plus 1000 times the sum of the largest violation of each limit.
 ///
-/// The search box consists of the family's bounds if they are finite, otherwise of the span of 100 random starts,
+/// The search box is given by the family's bounds if they are finite, otherwise by the range of 100 random starts,
 /// widened by 1.3. The search grid, seed and time limit are those of `settings` (the seed in the optimiser's settings
-/// is not used). Up to three searches run, with wider margins while a limit is violated between samples; the result is
-/// the best motion by the check between samples.
+/// is not used). At most three searches run, with wider margins while a limit is violated between samples. The result
+/// is the best motion by the check between samples.
 ///
-/// Also returns the [`Generation`]s of the first search (for CMA-ES all three values are the best so far).
+/// Also returns the [`Generation`]s of the first search (for CMA-ES all three values are the best value so far).
 ///
 /// # Errors
 /// If settings are out of range.
@@ -206,7 +208,7 @@ fn search_box(task: &DesignTask<'_>, seed: u64) -> SearchBox {
     SearchBox { bounds: bounds.collect(), start: starts.into_iter().next().unwrap_or_default() }
 }
 
-/// Fitness of parameters, with one scratch for each concurrent thread.
+/// Computes the fitness of parameters, with scratch memory for each concurrent thread.
 struct Objective<'a> {
     task: &'a DesignTask<'a>,
     criterion: &'a dyn Criterion,

@@ -1,9 +1,10 @@
-//! Design of the trajectory of a family that is optimal by a criterion within all limits.
+//! Design of a trajectory: finds the parameters of a trajectory family that optimise a criterion within all limits.
 //!
-//! The search consists of many random starts. Each is an augmented-Lagrangian descent with exact gradients: parameters
-//! → motion → regressor and limits, and one reverse sweep back. Rounds follow one another (random starts on a coarse
-//! grid, restarts around the best, a polish on the fine grid), each within an evaluation budget, so that the result
-//! depends only on the seed. A time limit ends the search early with the best feasible trajectory so far.
+//! The search consists of many random starts. Each start is an augmented-Lagrangian descent with exact gradients: a
+//! forward pass computes motion, regressor and limits from the parameters, and one reverse sweep the gradient. Rounds
+//! follow one another (random starts on a coarse grid, restarts around the best motion, a polish on the fine grid).
+//! Each round has an evaluation budget, so that the result depends only on the seed. A time limit ends the search
+//! early with the best feasible trajectory so far.
 
 pub(crate) mod assess;
 mod clear_starts;
@@ -43,27 +44,28 @@ use std::time::Instant;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 8, for condition numbers 4, with 24 or more parameters per joint 2.
-    /// For a large robot whose search would take more than about a minute on one core, all defaults are lower, unless
-    /// one of `starts`, `rounds`, `evaluations_per_start` and `time_limit_s` is given.
+    /// Number of random starts of the first round. Default 8; 4 for condition numbers, 2 for condition numbers with
+    /// 24 or more parameters per joint. All defaults are lower for a large robot whose search would take more than
+    /// about a minute on one core, unless one of `starts`, `rounds`, `evaluations_per_start` and `time_limit_s` is
+    /// given.
     pub starts: Option<usize>,
-    /// Rounds of restarts around the best, each with half as many starts but at least two. Default 1, for condition
-    /// numbers 36, with 24 or more parameters per joint 8.
+    /// Number of rounds of restarts around the best motion, each with half as many starts as the first round, but at
+    /// least two. Default 1; 36 for condition numbers, 8 for condition numbers with 24 or more parameters per joint.
     pub rounds: Option<usize>,
-    /// Maximum number of evaluations of a start or restart. Default 1,000; for condition numbers 600 per start and 500
-    /// per restart, with 24 or more parameters per joint 2,000.
+    /// Maximum number of evaluations of a start or restart. Default 1,000. For condition numbers 600 per start and
+    /// 500 per restart; 2,000 for condition numbers with 24 or more parameters per joint.
     pub evaluations_per_start: Option<usize>,
-    /// Maximum number of evaluations of a polish. Up to six polishes follow while a limit is violated between samples.
-    /// Default 1,000.
+    /// Maximum number of evaluations of a polish (final descent on a fine grid). At most six more polishes follow
+    /// while a limit is violated between samples. Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96 (for condition numbers and linear families 64), but at least five per
-    /// free parameter of a joint, for families that move fast, and 12.5 per second where places are limited, so that
-    /// paths between samples, which are tested against columns, are nearly straight.
+    /// Number of samples of the search grid. Default 96 (64 for condition numbers and linear families), but at least
+    /// five per free parameter of a joint, for families that move fast. With place limits at least 12.5 samples per
+    /// second, so that the paths between samples, which are tested against columns, are nearly straight.
     pub search_samples: Option<usize>,
     /// Rate of the log, Hz. The information includes every logged sample. Default 100.
     pub rate_hz: f64,
-    /// Time limit, s, after which the search returns the best result so far; no limit by default. The result then
-    /// depends on the computer.
+    /// Time limit, s, after which the search returns the best result so far; no limit by default. With a time limit
+    /// the result depends on the computer.
     pub time_limit_s: Option<f64>,
     /// Seed of the random starts. Default 1.
     pub seed: u64,
@@ -100,12 +102,12 @@ impl DesignSettings {
     }
 }
 
-/// Minimum number of samples of the search grid, and the smaller minimum for criteria that need many descents. With
+/// Minimum number of samples of the search grid, and a smaller minimum for criteria that need many descents. For
 /// linear families the coarser grid determines extremes to a few per cent.
 const MIN_SAMPLES: usize = 96;
 const MIN_SAMPLES_MULTIMODAL: usize = 64;
 
-/// Rate of the search grid where places are limited, Hz for a usual arm.
+/// Sampling rate of the search grid with place limits, Hz for an arm of usual size.
 const PLACE_RATE_HZ: f64 = 12.5;
 
 /// Task of a design.
@@ -113,8 +115,8 @@ const PLACE_RATE_HZ: f64 = 12.5;
 pub struct DesignTask<'a> {
     /// Trajectory family.
     pub family: &'a dyn Family,
-    /// Criteria in the order of the rounds: each round uses the next one (a smooth norm first, then a sharper one);
-    /// further rounds use the last.
+    /// Criteria in the order of the rounds: each round uses the next criterion (a smooth norm first, then a sharper
+    /// one); further rounds use the last criterion.
     pub criteria: &'a [&'a dyn Criterion],
     /// Limits that the motion must keep.
     pub limits: &'a LimitSet,
@@ -122,7 +124,7 @@ pub struct DesignTask<'a> {
     pub layout: &'a PanelLayout,
     /// Standard deviation of each joint's torque, Nm (N).
     pub torque_std_nm: &'a [f64],
-    /// Prior information.
+    /// Prior information matrix of the columns, added to that of the motion.
     pub prior: Option<&'a DMatrix<f64>>,
 }
 
@@ -131,11 +133,11 @@ pub struct DesignTask<'a> {
 pub struct Design {
     /// Parameters of the family.
     pub parameters: Vec<f64>,
-    /// Information of the trajectory, with every logged sample.
+    /// Information matrix of the trajectory, from every logged sample.
     pub information: DMatrix<f64>,
     /// Value of the last criterion.
     pub figure: Option<f64>,
-    /// Largest `ratio - 1` of all limits, refined between samples; not positive for a feasible trajectory.
+    /// Largest `ratio - 1` of all limits, also between samples; not positive for a feasible trajectory.
     pub violation: f64,
     /// Number of evaluations of cost and gradient.
     pub evaluations: usize,
@@ -148,9 +150,9 @@ pub struct Design {
 pub struct DesignProgress {
     /// Name of the round.
     pub round: &'static str,
-    /// Best smooth value of the criterion of the round; infinite before the first evaluation.
+    /// Best smooth value of the round's criterion; infinite before the first evaluation.
     pub value: f64,
-    /// Largest violation at the best value.
+    /// Largest violation of the motion with the best value.
     pub violation: f64,
     /// Number of evaluations so far.
     pub evaluations: u64,
@@ -173,7 +175,7 @@ pub fn design(
     timed(task, settings, &watch, &|| begun.elapsed().as_secs_f64())
 }
 
-/// [`design()`] with the clock `elapsed_s`, in seconds since the start.
+/// Like [`design()`], with the clock `elapsed_s`, in seconds since the start.
 fn timed(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
@@ -199,16 +201,16 @@ pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| duration_s * k as f64 / (count.max(2) - 1) as f64).collect()
 }
 
-/// Root mean square of the parameters of the joint, for each parameter (stored joint after joint). Scales the noise of
-/// restarts.
+/// Root mean square of the parameters of each joint, repeated for each parameter (stored joint after joint). Scales
+/// the noise of restarts.
 fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
     let per_joint = (parameters.len() / joints.max(1)).max(1);
     let rms = |part: &[f64]| (part.iter().map(|p| p * p).sum::<f64>() / part.len() as f64).sqrt();
     parameters.chunks(per_joint).flat_map(|part| vec![rms(part); part.len()]).collect()
 }
 
-/// Position ranges and velocity limits for random starts: those of the study where they are narrower than those of the
-/// robot description.
+/// Position ranges and velocity limits for random starts: limits of the study where they are narrower than those of
+/// the robot description.
 pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     let free = |joint: &dynident_model::Joint| if joint.is_rotary() { core::f64::consts::PI } else { 0.5 };
     let mut ranges: Vec<[f64; 2]> = limits.model().joints().iter().map(|joint| [-free(joint), free(joint)]).collect();
@@ -219,7 +221,7 @@ pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
             0 => {
                 let range = &mut ranges[band.joint];
                 let [lower, upper] = [middle - band.half, middle + band.half];
-                // A range outside half a turn is used unchanged.
+                // A range that does not overlap half a turn around zero is used unchanged.
                 *range = if lower < range[1] && upper > range[0] {
                     [lower.max(range[0]), upper.min(range[1])]
                 } else {

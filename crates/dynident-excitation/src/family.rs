@@ -6,8 +6,9 @@ use nalgebra::DMatrix;
 
 /// A family of trajectories of all joints over one duration, with a vector of free parameters.
 ///
-/// Parameters are stored joint after joint unless the family states otherwise. Every family provides q, q̇, q̈ and jerk
-/// analytically, and exact derivatives of a cost with respect to its parameters from those with respect to the motion.
+/// Parameters are stored joint after joint unless the family states otherwise. Every family provides q, q̇, q̈ and
+/// jerk analytically. It also provides exact derivatives of a cost with respect to its parameters, from derivatives
+/// with respect to the motion.
 pub trait Family: core::fmt::Debug + Send + Sync {
     /// The family's name in study files and results.
     fn name(&self) -> &'static str;
@@ -21,7 +22,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// Number of free parameters of all joints.
     fn parameters(&self) -> usize;
 
-    /// Lower and upper bound of each parameter required by the family (not by the robot); infinite without bound.
+    /// Lower and upper bound of each parameter that the family requires (not the robot); infinite if unbounded.
     fn bounds(&self) -> Vec<[f64; 2]>;
 
     /// Random start of suitable size for joints with the given position range `[lower, upper]` and velocity limit,
@@ -41,12 +42,12 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// If lengths differ.
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]);
 
-    /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the
-    /// derivatives of the joint's q, q̇, q̈ and jerk with respect to its parameters and `w_o` the values of `weights`
-    /// in the same arrays. Returns false and adds nothing if the family does not implement it; optimisers then learn
-    /// the curvature of limits from their steps.
+    /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, with the joint's parameters). `b_o(s)` are
+    /// the derivatives of the joint's q, q̇, q̈ and jerk at sample s with respect to its parameters. `w_o(s)` are the
+    /// values of `weights` in the same arrays. Returns false and adds nothing if the family does not implement it;
+    /// optimisers then estimate the curvature of limits from their steps.
     ///
-    /// Only for families whose joints have separate parameters, equally many, stored joint after joint.
+    /// Only for families whose joints have separate parameters, the same number each, stored joint after joint.
     ///
     /// # Panics
     /// If shapes differ.
@@ -68,7 +69,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     }
 }
 
-/// Panics of [`Family::apply_adjoint`].
+/// Checks the array lengths of [`Family::apply_adjoint`] and panics if they differ.
 pub(crate) fn check_shapes(
     family: &impl Family,
     parameters: &[f64],

@@ -9,8 +9,8 @@ use dynident_lanes::Level;
 use dynident_model::Model;
 use nalgebra::DMatrix;
 
-/// `D = D₀ + Σ_j W_jᵀ W_j / σ_j²` over all samples of a motion: the information about the columns of a layout, and its
-/// adjoint.
+/// Information matrix `D = D₀ + Σ_j W_jᵀ W_j / σ_j²` over all samples of a motion, about the columns of a layout, and
+/// its adjoint. D₀ is prior information, W_j the regressor of joint j and σ_j the standard deviation of its torque.
 pub struct Information<'a> {
     model: &'a Model,
     layout: &'a PanelLayout,
@@ -67,9 +67,9 @@ impl<'a> Information<'a> {
         DMatrix::from_vec(count, count, gram)
     }
 
-    /// Adds the derivatives of a cost with respect to the motion of the last [`of`](Information::of), given its
-    /// symmetric derivative `by_information = ∂f/∂D`: the adjoint of the regressor is `2 W_j G / σ_j²`, and one reverse
-    /// sweep propagates it to the motion.
+    /// Adds the derivatives of a cost f with respect to the motion of the last [`of`](Information::of), given the
+    /// symmetric derivative `by_information = G = ∂f/∂D`. The adjoint of the regressor is `2 W_j G / σ_j²`, and one
+    /// reverse sweep propagates it to the motion.
     pub fn apply_adjoint(
         &mut self,
         motion: &Motion,

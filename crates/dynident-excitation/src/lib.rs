@@ -3,14 +3,14 @@
 //!
 //! | task | where |
 //! | --- | --- |
-//! | parametrise a motion | a [`Family`] of [`families`]: Fourier series, splines, multisines, strokes, .. |
-//! | set the limits of the robot | [`limits::Limits`]: joints, boxes, floor, column, the arm's own links |
+//! | parametrise a motion | a [`Family`] of [`families`]: Fourier series, splines, multisines, logistic functions, .. |
+//! | set the limits of the robot | [`limits::Limits`]: joints, boxes, floor, column, distances between the arm's own links |
 //! | choose the optimality criterion | a [`Criterion`](criteria::Criterion) of [`criteria`]: D-, A-, E-optimal, prediction |
 //! | find the best motion | [`design()`], or [`design_without_gradients()`] for comparison |
 //! | check all limits independently | [`check::check_limits`], which shares no code with the search |
 //! | find why no motion keeps the limits | [`limits::diagnose()`] |
 //! | predict the error bars | [`Information`] of the motion, [`predicted_covariance()`] of every parameter |
-//! | move one joint after another | [`step_wise`]: strokes over windows, as in the paper |
+//! | move one joint after another | [`step_wise`]: a short motion of each joint in its own time window |
 //! | export the motion to a robot | [`export`]: CSV, ROS 2, URScript |
 //!
 //! A [`Motion`] consists of plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic for a

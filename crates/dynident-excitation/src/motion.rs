@@ -35,7 +35,7 @@ impl Motion {
         [&self.q, &self.dq, &self.ddq, &self.dddq]
     }
 
-    /// The four arrays for changes of their values, in the order of [`arrays`](Self::arrays).
+    /// The four arrays in the order of [`arrays`](Self::arrays), with mutable values.
     pub fn arrays_mut(&mut self) -> [&mut Vec<f64>; 4] {
         [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.dddq]
     }

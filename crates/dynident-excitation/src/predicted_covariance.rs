@@ -1,4 +1,4 @@
-//! Predicted error bars of the parameters of a planned motion.
+//! Predicted error bars of the parameters for a planned motion.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -8,25 +8,27 @@ pub struct PredictedCovariance {
     /// Standard deviation of every parameter's estimate, `√(D⁻¹)_kk`; `None` for a parameter that the motion does not
     /// determine.
     pub std: Vec<Option<f64>>,
-    /// Directions in the parameter space that are determined worst, worst first.
+    /// Directions in the parameter space with the largest uncertainty, the largest first.
     pub worst: Vec<Direction>,
 }
 
-/// A combination of parameters, each in units of the standard deviation that it would have as the only unknown.
+/// A combination of parameters. The unit of each parameter is the standard deviation that it would have as the only
+/// unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Direction {
-    /// Factor by which the other parameters increase the standard deviation of this direction.
+    /// Factor by which the unknown other parameters increase the standard deviation of this direction.
     pub inflation: f64,
     /// Components of the direction, a unit vector.
     pub shares: Vec<f64>,
 }
 
-/// Predicts the covariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the
-/// covariance is `D⁻¹` if the torque errors are independent with the assumed σ_j (Swevers et al., IEEE Trans. Robotics
-/// and Automation 13(5), 1997). Residuals that are correlated in time increase the error bars, by 1.3 to 9 times on
-/// known arms.
+/// Predicts the covariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion (W_j:
+/// regressor of joint j, σ_j: standard deviation of its torque). The covariance is `D⁻¹` if the torque errors are
+/// independent with the assumed σ_j (Swevers et al., IEEE Trans. Robotics and Automation 13(5), 1997). Residuals that
+/// are correlated in time increase the error bars, by factors of 1.3 to 9 on known arms.
 ///
-/// Directions are the `directions` worst eigenvectors of `D` with unit diagonal.
+/// The reported directions are the `directions` eigenvectors with the smallest eigenvalues of `D`, scaled to a unit
+/// diagonal.
 pub fn predicted_covariance(information: &DMatrix<f64>, directions: usize) -> PredictedCovariance {
     let count = information.nrows();
     let scale: Vec<f64> =

@@ -7,7 +7,7 @@
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 
-/// Width of the widest lanes; rows are padded to a multiple of it.
+/// Width of the widest SIMD register; rows are padded to a multiple of it.
 const LANE_WIDTH: usize = 8;
 
 /// Maximum number of QL steps for one eigenvalue; two are usual.
@@ -24,7 +24,7 @@ pub(crate) struct SymmetricEigen {
 impl SymmetricEigen {
     /// Decomposes the lower triangle of a symmetric matrix; `None` if an entry is not finite.
     ///
-    /// A matrix twice as large has bitwise the same vectors, and values twice as large.
+    /// A matrix twice as large has bit-identical vectors, and values twice as large.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Option<Self> {
         let size = matrix.nrows();
         let stride = size.next_multiple_of(LANE_WIDTH);
@@ -57,7 +57,7 @@ impl SymmetricEigen {
     pub(crate) fn weighted(&self, weights: &[f64]) -> DMatrix<f64> {
         let (size, stride) = (self.values.len(), self.stride);
         let mut out = vec![0.0; size * stride];
-        // Far below the last digit of the sum.
+        // Weights below this are far below the last digit of the sum.
         let least = 1e-20 * weights.iter().fold(0.0, |most: f64, weight| most.max(weight.abs()));
         for (vector, weight) in self.vectors.chunks_exact(stride.max(1)).zip(weights) {
             if weight.abs() > least {
@@ -123,7 +123,8 @@ impl Kernel for Decompose<'_> {
     fn run<T: Lane>(self) -> Option<Vec<f64>> {
         let Self { rows, size: n, stride } = self;
         let (mut diagonal, mut off_diagonal) = (vec![0.0; n], vec![0.0; n]);
-        // Reflections `1 - b v vᵀ`, one per column: v is stored in the row of the same number, zero up to the diagonal.
+        // Reflections `1 - b v vᵀ`, one per column: v is stored in the row with the same index and is zero up to the
+        // diagonal.
         let mut reflections = vec![0.0; n * stride];
         let mut factors = vec![0.0; n];
         let mut product = vec![0.0; stride];
@@ -183,7 +184,8 @@ impl Kernel for Decompose<'_> {
     }
 }
 
-/// `Q = H_0 H_1 ..` of the reflections `1 - b v vᵀ`, from the last; `product` is scratch of one row.
+/// Computes `Q = H_0 H_1 ..` of the reflections `1 - b v vᵀ`, starting with the last; `product` is scratch memory for
+/// one row.
 #[inline(always)]
 fn product_of_reflections<T: Lane>(reflections: &[f64], factors: &[f64], product: &mut [f64]) -> Vec<f64> {
     let (n, stride) = (factors.len(), product.len());
@@ -205,13 +207,14 @@ fn product_of_reflections<T: Lane>(reflections: &[f64], factors: &[f64], product
     q
 }
 
-/// Implicit QL steps on the tridiagonal matrix until the off-diagonal vanishes; the rows of `vectors` are rotated too.
+/// Implicit QL steps on the tridiagonal matrix until the off-diagonal entries vanish; the rows of `vectors` are
+/// rotated, too.
 #[inline(always)]
 fn ql<T: Lane>(diagonal: &mut [f64], off_diagonal: &mut [f64], vectors: &mut [f64], stride: usize) -> Option<()> {
     let n = diagonal.len();
     for first in 0..n {
         for step in 0.. {
-            // The block from `first` ends where the next off-diagonal entry is negligible.
+            // The block that begins at `first` ends where the next off-diagonal entry is negligible.
             let mut last = first;
             while last + 1 < n {
                 let around = diagonal[last].abs() + diagonal[last + 1].abs();

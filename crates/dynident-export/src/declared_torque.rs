@@ -1,4 +1,4 @@
-//! Declared torques as symbols: expressions by operation, tables by piece.
+//! Declared (user-defined) torques as symbols: an expression operation by operation, a table piece by piece.
 
 use crate::error::ExportError;
 use crate::graph::{Function, Function2};

@@ -13,8 +13,8 @@ use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, writ
 use dynident_text::xml::{self, escaped};
 use std::borrow::Cow;
 
-/// Friction errors below this share of the friction are not reported: rounding errors, or about 0.1 % for a narrow
-/// smooth step in place of a sign.
+/// Friction errors below this share of the friction are not reported: rounding errors, or about 0.1 % if a narrow
+/// smoothed sign function replaces a sign function.
 const MIN_REPORTED_ERROR_RATIO: f64 = 1e-3;
 
 /// MuJoCo's MJCF: bodies with inertials, joints with limits, `armature`, `damping` and `frictionloss`, one motor per
@@ -73,7 +73,7 @@ pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     Ok(Exported { text: format!("{head}\n{}{rest}", comment(&notes)), notes })
 }
 
-/// The nearest friction of every joint, with a note for each approximation.
+/// The friction of every joint that is nearest to the identified friction, with a note for each approximation.
 pub(crate) fn frictions(
     robot: &RobotModel,
     coulomb: &str,
@@ -102,13 +102,14 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Terms of the identified robot that are not among the terms `kept` of a form. A term with another step is kept.
+/// Terms of the identified robot that a format with the terms `kept` does not contain. A term that differs only in
+/// its sign function is treated as kept.
 pub fn terms_left_out(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<ModelTerm> {
     ModelTerm::of(robot, |term| kept.iter().all(|one| one.symbol() != term.symbol()))
 }
 
-/// Notes on the terms of the identified robot that a form with the terms `kept` leaves out or replaces, with their
-/// values. A term with another step is kept.
+/// Notes on the terms of the identified robot that a format with the terms `kept` omits or replaces, with their
+/// values. A term that differs only in its sign function is treated as kept.
 pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> {
     let omitted = robot.terms().filter(|(term, _)| kept.iter().all(|one| one.symbol() != term.symbol()));
     omitted
@@ -134,7 +135,7 @@ pub fn notes_on_omitted(robot: &RobotModel, kept: &[TorqueTerm]) -> Vec<String> 
         .collect()
 }
 
-/// Notes on terms that a robot description cannot represent; springs only if the format has none.
+/// Notes on terms that a robot description cannot represent. Springs are included only if the format has no springs.
 pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
@@ -217,7 +218,7 @@ fn write_body(
     Ok(())
 }
 
-/// Writes mimic joints: an equality of joints, or of a tendon whose length is constant under the mimic law.
+/// Writes mimic joints: as an equality of two joints, or of a tendon whose length is constant under the mimic law.
 fn write_followers(text: &mut String, model: &Model) {
     let Some(coupling) = model.coupling() else { return };
     let (mut tendons, mut equalities) = (String::new(), String::new());
@@ -246,12 +247,13 @@ fn write_followers(text: &mut String, model: &Model) {
     let _ = write!(text, "  <equality>\n{equalities}  </equality>\n");
 }
 
-/// Name of a link; renamed if it is the reserved name of the fixed body in MuJoCo.
+/// Name of a link; changed if it is the reserved name of the fixed body in MuJoCo.
 fn body_name(link: &str) -> Cow<'_, str> {
     if link == "world" { Cow::Borrowed("world_link") } else { escaped(link) }
 }
 
-/// Mass, centre of mass and inertia about it of a body; simulators accept only physically consistent bodies.
+/// Mass, centre of mass and inertia about the centre of mass of a body; simulators accept only physically consistent
+/// bodies.
 pub(crate) fn consistent_inertial(
     model: &Model,
     index: usize,

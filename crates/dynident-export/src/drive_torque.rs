@@ -8,13 +8,13 @@ use crate::symbol::Symbol;
 use dynident_lanes::{Real, Scalar};
 use dynident_model::terms::{Coulomb, JointMotion, TermConstant, TorqueTerm};
 
-/// Motion of all joints, and the load of load-dependent friction.
+/// Motion of all joints, and the torque that gears transmit, for load-dependent friction.
 #[derive(Clone, Copy)]
 pub(crate) struct SymbolMotion<'a> {
     pub(crate) q: &'a [Symbol],
     pub(crate) dq: &'a [Symbol],
     pub(crate) ddq: &'a [Symbol],
-    /// Torque on the gear of each joint; empty without load-dependent friction.
+    /// Torque that the gear of each joint transmits; empty without load-dependent friction.
     pub(crate) load: &'a [Symbol],
 }
 
@@ -27,9 +27,9 @@ pub(crate) struct Drives {
     pub(crate) friction: Vec<Symbol>,
     /// Declared torque; `None` without a declared term.
     pub(crate) declared: Option<Vec<Symbol>>,
-    /// Load-dependent friction of every joint per magnitude of its load; `None` without such friction.
+    /// Load-dependent friction of every joint per magnitude of the transmitted torque; `None` without such friction.
     pub(crate) load_shares: Option<Vec<Symbol>>,
-    /// Friction with memory, and the deflection of each element after the step.
+    /// Friction with hysteresis, and the deflection of each element after the step.
     pub(crate) memory: Option<(Vec<Symbol>, Vec<Symbol>)>,
 }
 
@@ -78,7 +78,7 @@ impl Drives {
         Ok(drives)
     }
 
-    /// Torque of everything but drive inertia; with an empty `load`, also without load-dependent friction.
+    /// Torque of all terms except drive inertia; with an empty `load`, also without load-dependent friction.
     pub(crate) fn torque(&self, load: &[Symbol]) -> Vec<Symbol> {
         let mut torque = self.friction.clone();
         let of_load = self.load_friction(load).filter(|_| !load.is_empty());
@@ -89,21 +89,22 @@ impl Drives {
         torque
     }
 
-    /// Load-dependent friction.
+    /// Load-dependent friction at the transmitted torque `load`.
     pub(crate) fn load_friction(&self, load: &[Symbol]) -> Option<Vec<Symbol>> {
         let shares = self.load_shares.as_ref()?;
         Some(shares.iter().zip(load).map(|(&share, load)| share * load.abs()).collect())
     }
 }
 
-/// `z ← clamp(z + q − last, −Δ, Δ)`, in the order of operations of the model.
+/// Deflection `z ← clamp(z + q − last, −Δ, Δ)` of an element with hysteresis, in the same order of operations as in
+/// the model.
 fn deflection(element: usize, joint: usize, yield_displacement: f64, q: &[Symbol]) -> Symbol {
     let [z, last] = [(Input::Deflection, element), (Input::LastPosition, joint)].map(|(of, at)| Symbol::input(of, at));
     let limit = Symbol::splat(yield_displacement);
     (z + q[joint] - last).call2(Function2::Max, -limit).call2(Function2::Min, limit)
 }
 
-/// Torque of joint `row` per unit of a term without memory.
+/// Torque of joint `row` per unit of a term without hysteresis.
 ///
 /// # Errors
 /// A term that is not a function of the motion.
@@ -121,7 +122,7 @@ pub(crate) fn unit_torque(term: &TorqueTerm, row: usize, motion: SymbolMotion<'_
     Ok(unit)
 }
 
-/// Dependence of a term on the velocity; for load-dependent friction its step.
+/// Dependence of a term on the velocity; for load-dependent friction its sign function.
 fn velocity_unit(term: &TorqueTerm, row: usize, dq: &[Symbol]) -> Result<Symbol, ExportError> {
     let step = term.step().filter(|_| term.needs_load());
     let unit = match step {
@@ -148,8 +149,8 @@ fn inertia<'a>(dof: usize, terms: impl Iterator<Item = (&'a TorqueTerm, f64)>) -
     matrix
 }
 
-/// Reference temperatures of the temperature-dependent terms, with their symbols; the exported functions apply at these
-/// temperatures.
+/// Reference temperatures of the temperature-dependent terms, with their symbols; the exported functions are valid at
+/// these temperatures.
 pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
     let reference = |(term, _): (&TorqueTerm, f64)| {
         let constants = term.constants().into_iter().filter(|_| term.needs_temperature());
@@ -162,9 +163,9 @@ pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
     robot.terms().filter_map(reference).collect()
 }
 
-/// Friction and offset of a joint at the velocity `dq`. Couplings, load and temperature dependence are omitted; Maxwell
-/// slip is replaced by the Coulomb friction that it reaches after a motion of twice its yield displacement. In Nm (N);
-/// `dq` in rad/s (m/s).
+/// Friction and offset of a joint at the velocity `dq`, in Nm (N); `dq` in rad/s (m/s). Couplings, load dependence
+/// and temperature dependence are omitted. Hysteresis (Maxwell slip) is replaced by the Coulomb friction that it
+/// reaches after a motion of twice its yield displacement.
 ///
 /// # Panics
 /// If the robot has no joint `joint`.
@@ -172,7 +173,7 @@ pub fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
     own_friction_terms(robot, joint, dq, None)
 }
 
-/// As [`own_friction`]; if `only` is given, for one term with a value of one.
+/// Like [`own_friction`]; if `only` is given, for this term alone with a value of one.
 pub(crate) fn own_friction_terms(robot: &RobotModel, joint: usize, dq: f64, only: Option<usize>) -> f64 {
     let zeros = vec![0.0; robot.model().dof()];
     let mut velocities = zeros.clone();

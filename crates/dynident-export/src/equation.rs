@@ -25,13 +25,13 @@ impl Equation {
     }
 }
 
-/// The function with state: torque of a motion, and the deflections of the elements with memory after it.
+/// The function with state: torque of a motion, and the deflections of the elements with hysteresis after it.
 #[derive(Debug)]
 pub(crate) struct StepEquation {
-    /// Inputs are the motion; positions and deflections before it are further inputs of the values. The torque is
-    /// followed by the deflections.
+    /// The inputs are the motion; positions and deflections before it are further inputs. In the output the
+    /// deflections follow the torque.
     pub(crate) equation: Equation,
-    /// Number of elements with memory.
+    /// Number of elements with hysteresis.
     pub(crate) elements: usize,
 }
 
@@ -50,7 +50,7 @@ impl Inputs {
         Self { q, dq, ddq, tau, rest: vec![Symbol::ZERO; dof] }
     }
 
-    /// Torque of the load bodies, empty without them.
+    /// Torque of the bodies that determines load-dependent friction; empty without such friction.
     pub(crate) fn load(&self, load: Option<&Model>) -> Vec<Symbol> {
         load.map_or_else(Vec::new, |load| inverse_dynamics_over(load, &self.q, &self.dq, &self.ddq))
     }

@@ -1,5 +1,5 @@
-//! The functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body algorithms over
-//! symbols.
+//! The exported functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body
+//! algorithms over symbols.
 
 use crate::drive_torque::Drives;
 use crate::equation::{Equation, Inputs, StepEquation};
@@ -24,7 +24,7 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// The functions, with the regressor on request; numbers are at most `most`.
+    /// Creates the functions, with the regressor on request. Constants must not exceed `most`.
     ///
     /// # Errors
     /// A torque term that is not a function of the motion, a joint without inertia, or an overflow.
@@ -63,7 +63,8 @@ struct Values {
 }
 
 impl Values {
-    /// Runs the algorithms; `weightless` is the reduced robot without gravity, `load` has the load bodies.
+    /// Runs the algorithms. `weightless` is the reduced robot without gravity; `load` has the bodies for
+    /// load-dependent friction.
     fn of(
         robot: &RobotModel,
         reduced: &Model,
@@ -159,7 +160,7 @@ impl Values {
     }
 }
 
-/// The function with state; `None` without a term with memory.
+/// The function with state; `None` without a term with hysteresis.
 fn step(
     robot: &RobotModel,
     reduced: &Model,

@@ -17,7 +17,7 @@ pub(crate) fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<
     mass_matrix
 }
 
-/// `M⁻¹ (τ − C q̇ − g − friction)`.
+/// Accelerations `M⁻¹ (τ − C q̇ − g − friction)`.
 ///
 /// # Errors
 /// A joint without inertia.
@@ -41,13 +41,14 @@ pub(crate) fn forward(
     })
 }
 
-/// Passes over the joints in which the friction under load converges. Each reduces the error by about the share of the
-/// load that is lost to friction: to 1e-9 for a share of 0.25, which is more than gears lose in motion.
+/// Number of iterations in which load-dependent friction converges. Each reduces the error by about the share of the
+/// transmitted torque that is lost to friction: to 1e-9 in all for a share of 0.25, which is more than gears lose in
+/// motion.
 const LOAD_PASSES: usize = 15;
 
-/// Subtracts load-dependent friction `f_i = s_i |l_i|` from accelerations `a₀` without it. The load depends on the
-/// acceleration, so that `l = l₀ − B f` with `l₀` at `a₀` and `B = L M⁻¹`, where `L` is the mass matrix of the load
-/// bodies. Solved by Gauss-Seidel iteration.
+/// Subtracts load-dependent friction `f_i = s_i |l_i|` from the accelerations `a₀` without it. The transmitted torque
+/// l depends on the acceleration: `l = l₀ − B f` with `l₀` at `a₀` and `B = L M⁻¹`, where `L` is the mass matrix of
+/// the bodies that determine l. Solved by Gauss-Seidel iteration.
 fn under_load(load: &Model, inputs: &Inputs, factor: &Factor, shares: &[Symbol], a: Vec<Symbol>) -> Vec<Symbol> {
     let Inputs { q, dq, rest, .. } = inputs;
     let dof = shares.len();
@@ -77,15 +78,15 @@ fn under_load(load: &Model, inputs: &Inputs, factor: &Factor, shares: &[Symbol],
     found
 }
 
-/// `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept (Featherstone,
-/// *Rigid Body Dynamics Algorithms* (2008), section 6.5).
+/// Factorisation `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept
+/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5).
 struct Factor {
     m: Vec<Symbol>,
     inverses: Vec<Symbol>,
 }
 
 impl Factor {
-    /// Fails with the index of a joint whose pivot is constant and not positive.
+    /// Returns the index of a joint as an error if its pivot is constant and not positive.
     fn of(mut m: Vec<Symbol>, dof: usize) -> Result<Self, usize> {
         let mut inverses = vec![Symbol::ZERO; dof];
         for k in (0..dof).rev() {

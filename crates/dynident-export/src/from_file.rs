@@ -1,4 +1,4 @@
-//! A robot from its [`ModelFile`]: all that a form needs without the robot description.
+//! A robot from its [`ModelFile`], which contains all data that an export format needs without the robot description.
 
 use crate::error::ExportError;
 use crate::model_file::{ModelFile, ModelLink, ModelPlacement};
@@ -9,8 +9,8 @@ use dynident_model::{
 };
 
 impl ModelFile {
-    /// The robot with these torque terms and a value for each, in place of the terms of the file. Joints of the terms
-    /// are the degrees of freedom, base to tip.
+    /// Returns the robot with these torque terms and a value for each, instead of the terms of the file. Joints of
+    /// the terms are the degrees of freedom, base to tip.
     ///
     /// # Errors
     /// A parent that is not in the file, numbers that are not finite, and as [`RobotModel::new`].

@@ -1,8 +1,8 @@
-//! Expression graph with unique values, folded constants and without zeros.
+//! Expression graph in which every value exists once, constants are folded, and zeros are omitted.
 //!
-//! Nodes are simplified when they are created: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs are
-//! moved outward so that `a b` and `-a b` share their product, and equal nodes are merged. Adding zero and moving a
-//! sign keep every bit of a finite result; two consecutive constant factors are merged, which rounds once less.
+//! Nodes are simplified when they are created. `x + 0`, `x · 0`, `x · 1` and sums of constants are folded. Signs are
+//! moved outward so that `a b` and `-a b` share their product. Equal nodes are merged. Adding zero and moving a sign
+//! keep every bit of a finite result. Two consecutive constant factors are merged, which saves one rounding.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,7 @@ pub(crate) enum Input {
     Torque,
     /// Position at the previous call of the function with state.
     LastPosition,
-    /// Deflection of an element with memory; the index is that of the element.
+    /// Deflection of an element with hysteresis, with the index of the element.
     Deflection,
 }
 
@@ -92,7 +92,7 @@ pub(crate) enum Node {
     Call2(Function2, Id, Id),
     /// `x^p` for positive x.
     Power(Id, u64),
-    /// Sign of x; zero if `|x|` is at most the band.
+    /// Sign of x; zero if `|x|` is at most the dead band.
     Step(Id, u64),
 }
 
@@ -146,7 +146,7 @@ impl Graph {
         place
     }
 
-    /// A constant that is not finite, or is larger than `most`.
+    /// A constant of the graph that is not finite, or larger than `most`.
     pub(crate) fn too_large(&self, most: f64) -> Option<f64> {
         self.nodes.iter().find_map(|node| match node {
             Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| value.is_nan() || value.abs() > most),
@@ -162,7 +162,7 @@ impl Graph {
     }
 
     pub(crate) fn constant(&mut self, value: f64) -> Id {
-        // Negative zero becomes zero, which changes no sum.
+        // Negative zero becomes zero; no sum changes.
         self.place(Node::Constant((value + 0.0).to_bits()))
     }
 

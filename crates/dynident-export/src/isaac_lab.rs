@@ -19,14 +19,14 @@ pub struct Actuator {
     pub friction: f64,
     /// Largest torque, Nm (N); `None` without limit.
     pub effort_limit: Option<f64>,
-    /// Largest speed, rad/s (m/s); `None` keeps that of the robot's file.
+    /// Largest speed, rad/s (m/s); `None` keeps the value of the robot's file.
     pub velocity_limit: Option<f64>,
     /// Time from a command to its effect, s.
     pub delay_s: f64,
 }
 
-/// Effort limit of a drive without one: PhysX's default for explicit actuators. With `None`, Isaac Lab uses the limit
-/// of the robot's file.
+/// Effort limit that is written for a drive without a limit: PhysX's default for explicit actuators. With `None`,
+/// Isaac Lab would use the limit of the robot's file.
 const NO_LIMIT: f64 = 1e9;
 
 const MEANING: [&str; 5] = [

@@ -1,13 +1,13 @@
-//! Exports identified models to controllers and simulators: a [`RobotModel`] in, text out.
+//! Exports identified models to controllers and simulators: converts a [`RobotModel`] to the text of a file.
 //!
 //! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols instead of
-//! numbers. The result is an expression graph with the constants of this robot folded in (as base parameters, to
-//! minimise their number), without zeros and with shared common values. Every language prints that graph as
-//! straight-line code:
+//! numbers. The result is an expression graph that contains the constants of this robot (as base parameters, because
+//! their number is minimal). It has no zeros, and common values are shared. Every language prints that graph as code
+//! without branches:
 //!
 //! | target | output |
 //! | --- | --- |
-//! | [`Target::C`] | one header, C99, nothing but math.h |
+//! | [`Target::C`] | one header, C99, only math.h |
 //! | [`Target::Cpp`] | one header, C++17, a namespace, `std::array` |
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
@@ -27,8 +27,8 @@
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
-//! friction`. Load-dependent friction is a further function `load_friction`; friction with memory is in a function
-//! `step` with state ([`RobotModel::with_state_terms`]).
+//! friction`. Load-dependent friction is in a separate function `load_friction`, friction with hysteresis in a
+//! function `step` with state ([`RobotModel::with_state_terms`]).
 
 #![forbid(unsafe_code)]
 

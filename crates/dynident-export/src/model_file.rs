@@ -11,25 +11,25 @@ use std::collections::BTreeMap;
 /// Name and version of the schema of [`ModelFile`].
 pub const MODEL_SCHEMA: &str = "dynident/model/1";
 
-/// The whole model: `tau = M(q) ddq + C(q, dq) dq + g(q)` and the torque of all terms. Prismatic joints have m, N and
-/// kg in place of rad, Nm and kg m²; units and the names of constants show this.
+/// The whole model: `tau = M(q) ddq + C(q, dq) dq + g(q)` plus the torque of all terms. Prismatic joints have m, N
+/// and kg instead of rad, Nm and kg m²; units and the names of constants show this.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelFile {
-    /// [`MODEL_SCHEMA`].
+    /// Name and version of the schema, [`MODEL_SCHEMA`].
     pub schema: String,
-    /// The robot's name.
+    /// Name of the robot.
     pub name: String,
-    /// Program and version.
+    /// Name and version of the program that wrote the file.
     pub written_by: String,
-    /// Origin of the model and objections to it, one sentence each.
+    /// Origin of the model, and problems of the identification, one sentence each.
     pub notes: Vec<String>,
     /// Gravity in the base frame, m/s².
     pub gravity_m_s2: [f64; 3],
-    /// Fixed links; the first has the frame of the base.
+    /// Links that do not move; the frame of the first link is the frame of the base.
     pub base_links: Vec<ModelLink>,
-    /// Joints with the body that each moves, parents before children. Positions, velocities and torques are vectors
-    /// over the independent joints, in this order.
+    /// Joints, each with the body that it moves, parents before children. Positions, velocities and torques are
+    /// vectors over the independent joints, in this order.
     pub joints: Vec<ModelJoint>,
     /// Inertia and friction of drives that are coupled to two joints.
     pub couplings: Vec<ModelTerm>,
@@ -54,9 +54,9 @@ pub struct ModelJoint {
     pub limits: ModelLimits,
     /// Body moved by the joint.
     pub body: ModelBody,
-    /// Friction, offset and drive inertia.
+    /// Torque terms of the joint: friction, offset and drive inertia.
     pub terms: Vec<ModelTerm>,
-    /// Mimic law; absent for an independent joint.
+    /// Law by which the joint follows others (mimic law); absent for an independent joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub follows: Option<ModelFollower>,
 }
@@ -65,9 +65,9 @@ pub struct ModelJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelFollower {
-    /// Independent source joints, and the velocity of this joint per velocity of each.
+    /// Independent joints that this joint follows, each with the ratio of this joint's velocity to its velocity.
     pub multipliers: BTreeMap<String, f64>,
-    /// Position while all sources are at zero, rad (m).
+    /// Position of this joint while all followed joints are at zero, rad (m).
     pub offset: f64,
 }
 
@@ -98,7 +98,7 @@ pub struct ModelLimits {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelBody {
-    /// Name of the joint's own link, whose frame is the frame of the numbers.
+    /// Name of the joint's child link; all numbers of the body are in the frame of this link.
     pub name: String,
     /// Mass, kg.
     pub mass_kg: f64,
@@ -106,8 +106,8 @@ pub struct ModelBody {
     pub com_m: Option<[f64; 3]>,
     /// Inertia about the centre of mass, kg m²: xx, xy, xz, yy, yz, zz; null for a body without mass.
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
-    /// The ten parameters in which torque is linear: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the
-    /// origin.
+    /// The ten parameters in which the torque is linear: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the
+    /// origin of the frame.
     pub parameters: [f64; 10],
     /// All links of the body.
     pub links: Vec<ModelLink>,
@@ -127,29 +127,29 @@ pub struct ModelLink {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelPlacement {
-    /// Origin, m.
+    /// Origin of the frame in the other one, m.
     pub translation_m: [f64; 3],
     /// Rotation matrix, row by row; its columns are the axes of the frame.
     pub rotation: [[f64; 3]; 3],
 }
 
-/// A torque term: value times the function of its kind.
+/// A torque term: its torque is the value times the function of its kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelTerm {
-    /// Symbol, as in `result.json`.
+    /// Symbol of the term, as in `result.json`.
     pub symbol: String,
     /// `viscous`, `coulomb`, `directional-viscous`, `directional-coulomb`, `stribeck`, `sigmoid`, `power`, `load`,
     /// `maxwell-slip`, `temperature-viscous`, `temperature-coulomb`, `offset`, `drive-inertia` or `coupling`; the
     /// functions are listed in the chapter on export of the book.
     pub kind: String,
-    /// Joints that the term acts on: one, or two for a coupling.
+    /// Joints on which the term acts: one, or two for a coupling.
     pub joints: Vec<String>,
     /// Value of the parameter.
     pub value: f64,
     /// Unit of the value.
     pub unit: String,
-    /// Constants of the function, by names with units.
+    /// Constants of the function, by name; names contain units.
     pub constants: BTreeMap<String, ModelConstant>,
 }
 
@@ -227,7 +227,7 @@ impl ModelTerm {
         terms
             .map(|(term, value)| {
                 let felt: Vec<&Joint> = term.joints().into_iter().map(|joint| &joints[joint]).collect();
-                // The ratios of a coupling of a revolute and a prismatic joint have both units.
+                // A coupling of a revolute and a prismatic joint has ratios in both units.
                 let is_rotary = felt.iter().any(|joint| joint.is_rotary());
                 Self {
                     symbol: term.symbol(),
@@ -246,7 +246,7 @@ impl ModelTerm {
     }
 }
 
-/// Unit at a revolute joint, or the corresponding unit at a prismatic joint.
+/// Unit of a constant at a revolute joint, or the corresponding unit at a prismatic joint.
 fn unit(revolute: &str, is_rotary: bool) -> String {
     if is_rotary {
         return revolute.to_owned();
@@ -254,7 +254,7 @@ fn unit(revolute: &str, is_rotary: bool) -> String {
     revolute.replace("kg m^2", "kg").replace("Nm", "N").replace("rad", "m")
 }
 
-/// A constant with its unit in its name; a step becomes shape and width.
+/// A constant, with its unit in its name. A sign function becomes two constants, shape and width.
 fn constants(name: &'static str, value: TermConstant, is_rotary: bool) -> Vec<(String, ModelConstant)> {
     let with_unit = |name: &str, at_revolute: &str| {
         let unit = if is_rotary { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };

@@ -4,13 +4,14 @@ use crate::drive_torque::{own_friction, own_friction_terms};
 use crate::recorded_velocity::RecordedVelocity;
 use crate::robot_model::RobotModel;
 
-/// Number of equally spaced speeds for the comparison without a recorded motion; enough to resolve the shape of a law.
+/// Number of equally spaced velocities for the fit if no motion was recorded; enough to represent the shape of a
+/// friction law.
 const SPEED_COUNT: u32 = 200;
 
-/// Speed range of joints without a velocity limit, rad/s or m/s.
+/// Velocity range of the fit for joints without a velocity limit, rad/s or m/s.
 const DEFAULT_MAX_SPEED: f64 = 1.0;
 
-/// Velocities over which the nearest friction is fitted.
+/// Velocities at which the simulator's friction is fitted to the identified friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ComparedOver {
     /// The velocities of the recorded motion.
@@ -22,21 +23,22 @@ pub enum ComparedOver {
 /// Coulomb and viscous friction that approximate the law of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestFriction {
-    /// `c`, Nm (N), nonnegative.
+    /// Coulomb friction `c`, Nm (N), nonnegative.
     pub coulomb: f64,
-    /// `d`, Nm s/rad (N s/m), nonnegative.
+    /// Viscous friction `d`, Nm s/rad (N s/m), nonnegative.
     pub viscous: f64,
-    /// Velocities of the fit.
+    /// Which velocities were used for the fit.
     pub over: ComparedOver,
-    /// Largest speed of the fit, rad/s (m/s): the recorded one, or the joint's limit, or 1 without a limit.
+    /// Largest velocity of the fit, rad/s (m/s): that of the recorded motion, otherwise the joint's limit, or 1
+    /// without a limit.
     pub most_speed: f64,
-    /// Root mean square of the difference over these velocities, Nm (N).
+    /// Root mean square of the difference of torques over these velocities, Nm (N).
     pub rms_error: f64,
-    /// Largest difference, Nm (N).
+    /// Largest difference of torques over these velocities, Nm (N).
     pub most_error: f64,
 }
 
-/// Sensitivity of the nearest friction to the value of a term.
+/// Sensitivity of the fitted friction to the value of a term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TermSensitivity {
     /// Index of the term among the robot's terms.
@@ -48,7 +50,7 @@ pub struct TermSensitivity {
 }
 
 impl NearestFriction {
-    /// No friction, for a mimic joint, which has no drive.
+    /// No friction: for a mimic joint, which has no drive.
     pub(crate) const NONE: Self = Self {
         coulomb: 0.0,
         viscous: 0.0,
@@ -58,10 +60,10 @@ impl NearestFriction {
         most_error: 0.0,
     };
 
-    /// Weighted least squares over the joint's recorded velocities; without them, over equally spaced velocities from
-    /// minus to plus its limit, except zero. Both values are nonnegative. The law consists of friction and offset of
-    /// the joint. With symmetric velocities, the even part (an offset or a difference between directions) has no
-    /// influence on the fit and is included in the error.
+    /// Fits the friction by weighted least squares over the joint's recorded velocities. If none were recorded, it
+    /// uses equally spaced velocities from minus to plus the joint's limit, except zero. Both values are nonnegative.
+    /// The identified law consists of friction and offset of the joint. With symmetric velocities, its even part (an
+    /// offset or a difference between directions) does not influence the fit and is included in the error.
     ///
     /// # Panics
     /// If the model does not have the joint.
@@ -84,8 +86,8 @@ impl NearestFriction {
         }
     }
 
-    /// Sensitivities of the nearest friction of a joint to the values of its terms. The dependence is linear as long as
-    /// the same bounds are active.
+    /// Sensitivities of the fitted friction of a joint to the values of its terms. The dependence is linear as long
+    /// as the same bounds are active.
     ///
     /// # Panics
     /// If the model does not have the joint.
@@ -115,7 +117,7 @@ fn velocities(robot: &RobotModel, joint: usize) -> (ComparedOver, Vec<RecordedVe
     (ComparedOver::VelocityLimit, even.collect())
 }
 
-/// Which of the two values are free.
+/// Which of the two values are free in the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fit {
     Both,
@@ -124,11 +126,11 @@ enum Fit {
     Neither,
 }
 
-/// Determinant of the normal equations, relative to `Σw Σw q̇²`, below which only one speed was recorded, so that
-/// Coulomb and viscous friction are indistinguishable.
+/// If the determinant of the normal equations, relative to `Σw Σw q̇²`, is below this, only one speed was recorded.
+/// Coulomb and viscous friction cannot be distinguished then.
 const MIN_DETERMINANT_RATIO: f64 = 1e-9;
 
-/// `Σw`, `Σw |q̇|`, `Σw q̇²`, `Σw sign(q̇) τ`, `Σw q̇ τ`.
+/// The sums `Σw`, `Σw |q̇|`, `Σw q̇²`, `Σw sign(q̇) τ` and `Σw q̇ τ` over samples with weight w.
 fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for (one, tau) in samples.iter().zip(tau) {
@@ -147,7 +149,7 @@ impl Fit {
         if count * square - size * size <= MIN_DETERMINANT_RATIO * count * square {
             return if by_sign > 0.0 { Self::CoulombOnly } else { Self::Neither };
         }
-        // On the boundary one value is zero and the other is its separate least-squares estimate.
+        // On the boundary one value is zero, and the other is the least-squares estimate without the first.
         match Self::Both.values(samples, tau) {
             (coulomb, viscous) if coulomb >= 0.0 && viscous >= 0.0 => Self::Both,
             (coulomb, _) if coulomb < 0.0 && by_speed > 0.0 => Self::ViscousOnly,

@@ -29,13 +29,13 @@ pub struct PayloadBody {
     pub inertial: InertialParameters,
 }
 
-/// The command, declaration or JSON that sets the payload of a controller; `None` for a body without mass or with
-/// numbers that are not finite.
+/// Returns the command, declaration or JSON that sets the payload of a controller; `None` for a body without mass or
+/// with numbers that are not finite.
 ///
 /// Units and axes depend on the controller. UR and Franka use the inertia about the centre of mass in kg m² along the
-/// axes of the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine entries). KUKA and ABB use the centre of
-/// mass in mm, principal moments, and their axes as angles A, B, C in degrees about Z, Y', X'' (KUKA) or as a
-/// quaternion (ABB). `comment` has lines for a comment before it; JSON has no comments.
+/// axes of the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine entries). KUKA and ABB use the centre
+/// of mass in mm and principal moments. The principal axes are angles A, B, C in degrees about Z, Y', X'' (KUKA) or a
+/// quaternion (ABB). `comment` contains lines for a comment before the command; JSON has no comments.
 pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand, comment: &[String]) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
@@ -82,7 +82,7 @@ pub fn payload_command(payload: &PayloadBody, reader: ControllerBrand, comment: 
     Some(head + &command)
 }
 
-/// ASCII text for the comment of a controller's language, in one line.
+/// Converts a text to one line of ASCII for a comment in a controller's language.
 fn one_line(text: &str) -> String {
     dynident_text::comment(&text.replace('±', "+-"))
         .chars()
@@ -90,7 +90,7 @@ fn one_line(text: &str) -> String {
         .collect()
 }
 
-/// Principal moments, and the rotation whose columns are their axes (right-handed).
+/// Principal moments, and the right-handed rotation whose columns are the principal axes.
 fn principal(inertia: &[[f64; 3]; 3]) -> ([f64; 3], Mat3) {
     let eigen = Matrix3::from_fn(|a, b| inertia[a][b]).symmetric_eigen();
     let v = eigen.eigenvectors;

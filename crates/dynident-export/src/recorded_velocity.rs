@@ -1,6 +1,6 @@
-//! Recorded velocities for the simplification of friction.
+//! Recorded velocities, over which friction is fitted to the laws of simulators.
 
-/// A velocity of a joint, with its number of samples.
+/// A velocity of a joint, with the number of samples at this velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedVelocity {
     /// Velocity, rad/s (m/s), not zero.

@@ -11,13 +11,13 @@ use dynident_lanes::Scalar;
 use dynident_model::InertialParameters;
 use dynident_model::terms::TorqueTerm;
 
-/// `W` and `θ` of `τ = W θ`: the base parameters of bodies and torque terms.
+/// Regressor `W` and base parameters `θ` of bodies and torque terms, with `τ = W θ`.
 pub(crate) struct Regressor {
-    /// `W`, row-major.
+    /// Entries of `W`, row-major.
     entries: Vec<Symbol>,
-    /// `θ`.
+    /// Values of `θ`.
     values: Vec<Symbol>,
-    /// Expression of each parameter in standard parameters.
+    /// Each base parameter as an expression of standard parameters.
     pub(crate) names: Vec<String>,
 }
 

@@ -7,8 +7,8 @@ use dynident_model::terms::{CoulombShape, TermClass, TorqueTerm};
 use dynident_model::urdf::MAX_MAGNITUDE;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
-/// Tolerance for rotation entries near 0 or ±1: rounding error of a right angle written as 1.5707963267948966. It
-/// moves a link of one metre by a femtometre.
+/// Tolerance for rotation entries near 0 or ±1: rounding error of a right angle written as 1.5707963267948966. A
+/// rounded entry moves a link of one metre by a femtometre.
 const RIGHT_ANGLE_TOLERANCE: f64 = 1e-15;
 
 /// A robot with inertial parameters of every body and a value of every torque term.
@@ -23,8 +23,8 @@ pub struct RobotModel {
 }
 
 impl RobotModel {
-    /// A robot with the inertial parameters of `model`, torque terms, and one value per term (Nm, Nm s/rad, kg m²,
-    /// depending on the term).
+    /// Creates a robot with the inertial parameters of `model`, torque terms, and one value per term (Nm, Nm s/rad,
+    /// kg m², depending on the term).
     ///
     /// # Errors
     /// A body without or with too large inertial parameters, values that are not finite or do not match the terms, or a
@@ -38,13 +38,13 @@ impl RobotModel {
         for (body, inertial) in model.bodies().iter().zip(model.inertials()) {
             check_numbers(body.name(), inertial)?;
         }
-        // Validates the terms.
+        // This call validates the terms.
         let checked = ParametricModel::new(model, terms)?;
         let (model, terms) = (checked.model().clone(), checked.terms().to_vec());
         Ok(Self { model, terms, values, velocities: Vec::new(), load: None, state_terms: Vec::new() })
     }
 
-    /// Replaces the torque terms, one value each; the load is kept.
+    /// Replaces the torque terms, with one value each; the bodies for load-dependent friction are kept.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -52,8 +52,9 @@ impl RobotModel {
         Ok(Self { load: self.load.clone(), ..Self::new(self.model.clone(), terms, values)? })
     }
 
-    /// Sets the inertial parameters whose rigid-body torque is the load of load-dependent friction, one set for each
-    /// body. They need not be physically consistent. Without this call the bodies of the model are used.
+    /// Sets the inertial parameters, one set per body, whose rigid-body torque load-dependent friction uses as
+    /// transmitted torque. They need not be physically consistent. Without this call the bodies of the model are
+    /// used.
     ///
     /// # Errors
     /// A different number of bodies, or numbers that are not finite.
@@ -62,8 +63,8 @@ impl RobotModel {
         Ok(Self { load: Some(bodies), ..self })
     }
 
-    /// Adds the torque terms of the function with state: all terms, also those with memory. Without this call, or if no
-    /// term has a memory, code has no function with state.
+    /// Sets the torque terms of the function with state: all terms, including those with hysteresis. Without this
+    /// call, or if no term has hysteresis, exported code has no function with state.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -74,9 +75,10 @@ impl RobotModel {
         Ok(Self { state_terms, ..self })
     }
 
-    /// Returns a copy with another width of the smooth steps that replace `sign(velocity)` in friction terms, rad/s
-    /// (m/s). Signs, and steps up to [`TermClass::CODE_STEP_WIDTH`], get the width `width`; wider steps are widened to
-    /// `width` if they are narrower. The values of the terms do not change.
+    /// Returns a copy with another width of the smoothed functions that replace `sign(velocity)` in friction terms,
+    /// rad/s (m/s). Unsmoothed sign functions, and smoothed ones with a width up to [`TermClass::CODE_STEP_WIDTH`],
+    /// get the width `width`. Wider functions are widened to `width` if they are narrower than `width`. The values of
+    /// the terms do not change.
     ///
     /// # Errors
     /// A width that is not a positive finite number.
@@ -85,7 +87,7 @@ impl RobotModel {
             return Err(ExportError::StepWidth { width });
         }
         let usual = |term: &TorqueTerm| {
-            // The width that a sign gets.
+            // The width that an unsmoothed sign function gets.
             let sign = term.clone().with_step(|_| CoulombShape::Sign { dead_band: 0.0 });
             let least = TermClass::FunctionsOfMotion.in_form(&self.model, &sign).step_width().unwrap_or(0.0);
             let is_narrow = term.step_width().is_some_and(|own| own <= least);
@@ -99,12 +101,13 @@ impl RobotModel {
         Ok(Self { terms, state_terms, ..self.clone() })
     }
 
-    /// Torque terms of the function with state; empty if no term has a memory.
+    /// Torque terms of the function with state; empty if no term has hysteresis.
     pub(crate) fn state_terms(&self) -> &[(TorqueTerm, f64)] {
         if self.state_terms.iter().any(|(term, _)| term.has_memory()) { &self.state_terms } else { &[] }
     }
 
-    /// The robot whose rigid-body torque is the load of load-dependent friction; `None` if no friction depends on it.
+    /// The robot whose rigid-body torque is the transmitted torque of load-dependent friction; `None` without such
+    /// friction.
     pub(crate) fn load_model(&self) -> Result<Option<Model>, ExportError> {
         let mut terms = self.terms.iter().chain(self.state_terms.iter().map(|(term, _)| term));
         if !terms.any(TorqueTerm::needs_load) {
@@ -116,7 +119,8 @@ impl RobotModel {
         }
     }
 
-    /// Adds the recorded velocities of each joint (empty if unknown), over which the friction of simulators is fitted.
+    /// Sets the recorded velocities of each joint (empty if unknown), over which friction is fitted to the laws of
+    /// simulators.
     ///
     /// # Errors
     /// A different number of joints, a velocity of zero, weights that are not positive, or numbers that are not finite.
@@ -149,16 +153,16 @@ impl RobotModel {
         self.terms.iter().zip(self.values.iter().copied())
     }
 
-    /// Name as an identifier of any language: letters, digits and `_`, not starting with a digit.
+    /// Name of the robot as an identifier in any language: letters, digits and `_`, not starting with a digit.
     pub fn identifier(&self) -> String {
         dynident_text::identifier(self.model.name())
     }
 
-    /// An equivalent robot with fewer numbers: base parameters at the places of their columns, all other inertial
+    /// An equivalent robot with fewer numbers: base parameters in the positions of their columns, all other inertial
     /// parameters zero, and exact right angles.
     ///
-    /// Its bodies are not physically consistent, but `M(q)`, `C(q, q̇) q̇` and `g(q)` are those of the robot, because
-    /// `Y π = Y_b θ` for every motion.
+    /// Its bodies are not physically consistent. But its `M(q)`, `C(q, q̇) q̇` and `g(q)` are those of the robot,
+    /// because `Y π = Y_b θ` for every motion (regressor Y of all parameters π, Y_b of the base parameters θ).
     pub(crate) fn reduced(&self) -> Result<Model, ExportError> {
         let with_exact_right_angles = with_exact_right_angles(&self.model)?;
         let rigid = ParametricModel::new(with_exact_right_angles.clone(), Vec::new())?;
@@ -184,7 +188,8 @@ fn check_terms(terms: &[TorqueTerm], values: &[f64]) -> Result<(), ExportError> 
     }
 }
 
-/// Checks that a body's parameters and the derived numbers in robot descriptions are within the magnitude limit.
+/// Checks that a body's parameters, and the numbers derived from them in robot descriptions, are within the magnitude
+/// limit.
 fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), ExportError> {
     let com = inertial.com_m().map_or([0.0; 3], |com| com.0);
     let inertia = inertial.inertia_at_com().map_or([[0.0; 3]; 3], |inertia| inertia.0);

@@ -9,9 +9,9 @@ use core::fmt::Write;
 use dynident_model::InertialParameters;
 use dynident_text::quoted;
 
-/// YAML of parameters: for each joint mass, centre of mass and inertia of its body, drive inertia, nearest Coulomb and
-/// viscous friction, and all torque terms; gravity; couplings. Arrays contain only numbers, and names only letters,
-/// digits and `_`, because ROS splits names at dots.
+/// YAML of parameters. For each joint: mass, centre of mass and inertia of its body, drive inertia, fitted Coulomb
+/// and viscous friction, and all torque terms. Also gravity and couplings. Arrays contain only numbers, and names
+/// only letters, digits and `_`, because ROS splits names at dots.
 pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     notes.push("Placements and axes of joints are those of robot_description.".to_owned());
@@ -64,7 +64,8 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     Ok(Exported { text, notes })
 }
 
-/// Writes terms by their symbols; omitted if empty, because a parameter cannot be an empty map.
+/// Writes terms with their symbols as keys; omits `key` if there are none, because a parameter cannot be an empty
+/// map.
 fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) {
     if terms.is_empty() {
         return;
@@ -95,7 +96,8 @@ fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) 
     }
 }
 
-/// Centre of mass and inertia about it. A body without mass has the origin, because a parameter cannot be null.
+/// Centre of mass, and inertia about it. For a body without mass the centre is the origin, because a parameter cannot
+/// be null.
 fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], [f64; 6]), ExportError> {
     match (inertial.com_m(), inertial.inertia_at_com()) {
         (Some(com), Some(inertia)) => Ok((com.0, upper_triangle(&inertia.0))),
@@ -104,7 +106,7 @@ fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], 
     }
 }
 
-/// Words that YAML 1.1 does not parse as text.
+/// Words that YAML 1.1 would not read as text.
 const RESERVED_WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
 
 /// Maximum key length; YAML allows 1024 characters before the colon.
@@ -121,7 +123,7 @@ fn parameter_names(names: &[&str]) -> Vec<String> {
         }
         let mut free = key.clone();
         let mut number = 2;
-        // The changed name may be the original name of another joint.
+        // The changed name can be the original name of another joint.
         while taken.contains(&free) || names.contains(&free.as_str()) && free != *name {
             free = format!("{key}_{number}");
             number += 1;

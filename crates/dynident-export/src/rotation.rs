@@ -2,7 +2,7 @@
 
 use dynident_model::Mat3;
 
-/// The unit quaternion w x y z of a rotation, by its largest entry (Shepperd 1978).
+/// The unit quaternion w x y z of a rotation, computed from its largest entry (Shepperd 1978).
 pub(crate) fn quaternion(r: &Mat3) -> [f64; 4] {
     let m = &r.0;
     let trace = m[0][0] + m[1][1] + m[2][2];

@@ -74,7 +74,7 @@ fn write_joint(
     let kind = match (joint.kind, stops) {
         _ if !joint.is_rotary() => "prismatic",
         (JointKind::Continuous, None) => "continuous",
-        // SDF treats missing limits as unlimited.
+        // SDF treats a missing limit as unlimited.
         _ => "revolute",
     };
     let mut limit = String::new();
@@ -85,7 +85,7 @@ fn write_joint(
         write_limit("lower", lower);
         write_limit("upper", upper);
     }
-    // In robot descriptions zero means unknown; in SDF a negative number, the default, does.
+    // In robot descriptions zero means an unknown limit; in SDF a negative number, the default, does.
     for (element, value) in [("effort", limits.effort), ("velocity", limits.velocity)] {
         if let Some(value) = value.filter(|value| *value > 0.0) {
             write_limit(element, value);
@@ -107,7 +107,7 @@ fn write_joint(
     );
 }
 
-/// Writes the links that are fixed to a body's own link, which has the name `link`.
+/// Writes the links that are fixed to a body's own link, which is called `link`.
 fn write_frames(text: &mut String, body: &Body, link: &str, names: &mut Names) {
     for fixed in &body.links[1..] {
         let name = names.of(&fixed.name);
@@ -131,7 +131,7 @@ struct Names {
 }
 
 impl Names {
-    /// The name as XML text, with an underscore appended while it is taken.
+    /// The name as XML text, with underscores appended until it is unique.
     fn of(&mut self, original: &str) -> String {
         let mut free = name(original);
         while self.taken.iter().any(|(_, taken)| *taken == free) {

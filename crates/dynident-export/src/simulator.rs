@@ -22,16 +22,16 @@ const NO_FRICTION_NOTE: &str = "not in the identified law, or at its bound of ze
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatorFile {
-    /// [`SIMULATOR_SCHEMA`].
+    /// Name and version of the schema, [`SIMULATOR_SCHEMA`].
     pub schema: String,
-    /// The robot's name.
+    /// Name of the robot.
     pub name: String,
-    /// Program and version.
+    /// Name and version of the program that wrote the file.
     pub written_by: String,
-    /// Origin of the values, contents that simulators cannot represent, and objections to the values, one sentence
+    /// Origin of the values, contents that simulators cannot represent, and problems of the values, one sentence
     /// each.
     pub notes: Vec<String>,
-    /// Common delay of all joints, ms, as [`SimulatorJoint::delay`]; null if the logs do not determine it.
+    /// Common delay of all joints, ms, defined like [`SimulatorJoint::delay`]; null if the logs do not determine it.
     pub common_delay: Option<SimulatorValue>,
     /// Joints in the order of the robot.
     pub joints: Vec<SimulatorJoint>,
@@ -45,14 +45,15 @@ pub struct SimulatorJoint {
     pub name: String,
     /// Drive inertia, kg m² (kg at a prismatic joint): MuJoCo's `armature`, PhysX's `armature`.
     pub armature: SimulatorValue,
-    /// Nm s/rad (N s/m): MuJoCo's `damping`, PhysX's `viscousFrictionCoefficient`.
+    /// Viscous friction, Nm s/rad (N s/m): MuJoCo's `damping`, PhysX's `viscousFrictionCoefficient`.
     pub damping: SimulatorValue,
-    /// Nm (N): MuJoCo's `frictionloss`, PhysX's `staticFrictionEffort` and `dynamicFrictionEffort`.
+    /// Coulomb friction, Nm (N): MuJoCo's `frictionloss`, PhysX's `staticFrictionEffort` and `dynamicFrictionEffort`.
     pub frictionloss: SimulatorValue,
-    /// Difference between the identified friction and its approximation by damping and frictionloss.
+    /// Error of the approximation of the identified friction by `damping` and `frictionloss`.
     pub friction_error: FrictionError,
-    /// Delay of the logged torque relative to the resulting motion, ms. For measured torque it is the delay of the
-    /// measurement; for commanded torque it is minus the delay of the actuator. Null if the logs do not determine it.
+    /// Delay of the logged torque relative to the motion that it causes, ms. For a measured torque it is the delay of
+    /// the measurement. For a commanded torque it is minus the delay of the actuator. Null if the logs do not
+    /// determine it.
     pub delay: Option<SimulatorValue>,
     /// Joint torque per unit of the logged torque, Nm (N).
     pub actuator_gain: SimulatorValue,
@@ -64,11 +65,11 @@ pub struct SimulatorJoint {
 pub struct SimulatorValue {
     /// The value.
     pub value: f64,
-    /// Half width of its 95 % interval; null if the logs do not determine it, with the reason in `note`.
+    /// Half-width of the 95 % interval; null if the logs do not determine it, with the reason in `note`.
     pub half_width_95: Option<f64>,
     /// Unit of the value.
     pub unit: String,
-    /// Remark on the value; absent if there is none.
+    /// Remark on the value; absent if there is no remark.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
 }
@@ -77,24 +78,24 @@ pub struct SimulatorValue {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionError {
-    /// Root mean square, Nm (N).
+    /// Root mean square of the error, Nm (N).
     pub rms_nm: f64,
     /// Largest error, Nm (N).
     pub most_nm: f64,
-    /// Largest velocity of the comparison, rad/s (m/s).
+    /// Largest velocity at which the friction was compared, rad/s (m/s).
     pub most_speed_rad_s: f64,
-    /// `recorded-motion`: velocities of the fitted logs, except near rest; `velocity-limit`: equally spaced velocities
-    /// up to the joint's limit, if no velocities were recorded.
+    /// Which velocities were compared. `recorded-motion`: velocities of the fitted logs, except near rest.
+    /// `velocity-limit`: equally spaced velocities up to the joint's limit, because no velocities were recorded.
     pub over: String,
 }
 
-/// Error bars, delays and gains of the drives.
+/// Error bars of torque terms, and delays and gains of the drives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveKnowledge {
-    /// Covariance of the values of each pair of terms, normalised so that the square root of the variance is half a 95
-    /// % interval; `None` for terms without an individual interval.
+    /// Covariance of the values of each pair of terms, scaled such that the square root of a variance is the
+    /// half-width of the 95 % interval; `None` for terms without an individual interval.
     pub term_products: Vec<Vec<Option<f64>>>,
-    /// Reason why a term has no individual interval, for each term; `None` if there is none.
+    /// For each term, the reason why it has no individual interval; `None` if it has one.
     pub term_notes: Vec<Option<String>>,
     /// Common delay of all joints.
     pub common_delay: Option<SimulatorValue>,
@@ -105,8 +106,9 @@ pub struct DriveKnowledge {
 }
 
 impl SimulatorFile {
-    /// The parameters of `robot`, whose friction is fitted over its recorded velocities. Error bars are `h² = aᵀ H a`
-    /// for a value that is `a` times the terms' values, with H = [`DriveKnowledge::term_products`].
+    /// Returns the parameters of `robot`, whose friction is fitted over its recorded velocities. A parameter that is
+    /// the combination `a` of the terms' values has the half-width h with `h² = aᵀ H a` and H =
+    /// [`DriveKnowledge::term_products`].
     ///
     /// # Errors
     /// [`ExportError::Values`] if `knowledge` does not match the robot.
@@ -177,7 +179,7 @@ impl SimulatorFile {
         })
     }
 
-    /// As JSON.
+    /// The content as JSON.
     ///
     /// # Errors
     /// [`ExportError::Json`] for values that are not finite.
@@ -187,7 +189,7 @@ impl SimulatorFile {
         Ok(Exported { text: text? + "\n", notes: self.notes.clone() })
     }
 
-    /// A Markdown table with the notes below.
+    /// A Markdown table, followed by the notes.
     pub fn table(&self) -> Exported {
         let mut text = format!(
             "# {}\n\n| joint | armature | damping | frictionloss | friction off by, rms (most) | delay | gain |\n| --- | --- | --- | --- | --- | --- | --- |\n",
@@ -240,7 +242,7 @@ impl SimulatorFile {
 }
 
 impl DriveKnowledge {
-    /// Half width of the interval of `Σ share value` over the terms, or the reason why there is none.
+    /// Half-width of the interval of `Σ share value` over the terms, or the reason why there is no interval.
     fn bar(&self, parts: &[(usize, f64)], none: &str) -> (Option<f64>, Option<String>) {
         let notes: Vec<&str> = parts.iter().filter_map(|(term, _)| self.term_notes[*term].as_deref()).collect();
         let note = (!notes.is_empty()).then(|| notes.join("; "));
@@ -253,7 +255,7 @@ impl DriveKnowledge {
     }
 }
 
-/// A value with its error bar, rounded to two significant digits of the bar.
+/// A value with its error bar; both are rounded to two significant digits of the error bar.
 fn with_bar(value: &SimulatorValue) -> String {
     let unit = &value.unit;
     match value.half_width_95.filter(|half| *half > 0.0 && half.is_finite()) {

@@ -1,5 +1,5 @@
-//! Converts a graph to the lines of a function. It contains only values that its outputs need; short values that are
-//! used once are inlined.
+//! Converts a graph to the lines of a function. The lines contain only values that the outputs need. A short value
+//! that is used once is written where it is used.
 
 use crate::graph::{Function, Function2, Graph, Id, Input, Node};
 use crate::symbol::Symbol;
@@ -75,8 +75,8 @@ pub(crate) fn statements(graph: &Graph, outputs: &[Symbol], syntax: &dyn Syntax)
     Statements { lines, outputs: outputs.iter().map(|output| text(output.id())).collect(), used }
 }
 
-/// Text of a node from the texts of its operands. Right operands keep parentheses, so that the order of summation is
-/// that of the graph.
+/// Text of a node from the texts of its operands. Right operands keep their parentheses, so that the order of
+/// summation is that of the graph.
 fn written(node: Node, texts: &[Option<(String, Precedence)>], syntax: &dyn Syntax) -> (String, Precedence) {
     let part = |id: Id, least: Precedence| match &texts[id as usize] {
         Some((text, strength)) if *strength >= least => text.clone(),

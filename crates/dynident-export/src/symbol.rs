@@ -6,7 +6,7 @@ use dynident_lanes::{Real, Scalar};
 use std::cell::RefCell;
 
 thread_local! {
-    /// Graph of the current thread: scalars are copied by value, so they cannot carry it.
+    /// Graph of the current thread. Symbols are copied by value, so they cannot contain it.
     static GRAPH: RefCell<Graph> = RefCell::new(Graph::new());
 }
 
@@ -88,7 +88,7 @@ impl Real for Symbol {
         Self::splat(0.5) * (self + other - (self - other).abs())
     }
 
-    /// Exact if `other` is zero, because halving and doubling do not round.
+    /// The result is exact if `other` is zero, because halving and doubling do not round.
     fn max(self, other: Self) -> Self {
         Self::splat(0.5) * (self + other + (self - other).abs())
     }
@@ -109,7 +109,7 @@ impl Real for Symbol {
         self.call(Function::Ln)
     }
 
-    /// A square, the most common power, needs no call.
+    /// A square, the most common power, is written as a product.
     fn power(self, exponent: f64) -> Self {
         if exponent == 2.0 { self * self } else { in_graph(|graph| graph.power(self.0, exponent)) }
     }

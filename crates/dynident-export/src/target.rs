@@ -65,7 +65,7 @@ impl Target {
         Self::Json,
     ];
 
-    /// The class of torque terms that the form can hold; `None` if it can list all terms.
+    /// Class of torque terms that the format can represent; `None` if it can list all terms.
     pub fn class(self) -> Option<TermClass> {
         match self {
             Self::C
@@ -82,12 +82,12 @@ impl Target {
         }
     }
 
-    /// Whether the form is a program.
+    /// Whether the format is source code.
     pub fn is_code(self) -> bool {
         self.class() == Some(TermClass::FunctionsOfMotion)
     }
 
-    /// Whether the code has a function with state for friction with memory.
+    /// Whether the code has a function with state for friction with hysteresis.
     pub fn has_state(self) -> bool {
         self.is_code() && self != Self::Pinocchio
     }
@@ -122,14 +122,16 @@ impl Target {
     }
 }
 
-/// Options of code.
+/// Options for exported code.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CodeOptions {
-    /// Numbers of 32 bits (C, C++ and Rust).
+    /// Whether numbers have 32 bits (C, C++ and Rust).
     pub float32: bool,
-    /// Adds the regressor of the base parameters and their values: `inverse_dynamics = W(q, dq, ddq) parameters`.
+    /// Whether to add the regressor of the base parameters and their values: `inverse_dynamics = W(q, dq, ddq)
+    /// parameters`.
     pub regressor: bool,
-    /// Width of the steps near zero velocity, rad/s (m/s): see [`RobotModel::with_step_width`]. `None` keeps them.
+    /// Width of the smoothed sign functions of friction, rad/s (m/s): see [`RobotModel::with_step_width`]. `None`
+    /// keeps the widths.
     pub step_width: Option<f64>,
 }
 
@@ -146,8 +148,8 @@ impl CodeOptions {
     }
 }
 
-/// Writes the robot in the format `target`; `further` are additional notes of the caller, such as the origin of the
-/// model.
+/// Writes the robot in the format `target`; `further` contains additional notes of the caller, such as the origin of
+/// the model.
 ///
 /// # Errors
 /// A torque term with memory in code (see [`RobotModel::with_state_terms`]); a joint without inertia; or an overflow.
@@ -155,7 +157,7 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
     export_with(robot, target, CodeOptions::default(), further)
 }
 
-/// As [`export`] with options of code.
+/// Like [`export`], with options for exported code.
 ///
 /// # Errors
 /// As [`export`], or an option that the format does not have.
@@ -173,7 +175,7 @@ pub fn export_with(
         .iter()
         .map(|(symbol, reference)| format!("{symbol} is left out: the drive is assumed to be at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
-    // Additional safety: shows invisible characters that a format did not escape.
+    // An additional precaution: makes invisible characters visible that a format did not escape.
     let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };
     let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
         let most = if options.float32 { f64::from(f32::MAX) } else { f64::MAX };
@@ -193,7 +195,7 @@ pub fn export_with(
         Target::Mjcf => mjcf(robot, notes),
         Target::Urdf => urdf(robot, notes),
         Target::Sdf => sdf(robot, notes),
-        // YAML contains the temperature terms.
+        // YAML contains the temperature-dependent terms.
         Target::Ros2Yaml => ros2_parameters(robot, further.to_vec()),
         Target::Json => model_json(robot, further.to_vec()),
     };

@@ -1,4 +1,4 @@
-//! Arrays of one file as a table: arrays that share the longest length are the columns.
+//! Arrays of one file as a table: the arrays that share the longest length are the columns.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -27,7 +27,7 @@ impl Array {
         Self { name, shape, values, strides: [1, shape[0]] }
     }
 
-    /// Dimensions of an array without those of length one; `None` if more than two remain.
+    /// The lengths of an array along its dimensions, without those of length one; `None` if more than two remain.
     pub(crate) fn two_sides(sides: &[usize]) -> Option<[usize; 2]> {
         match sides.iter().copied().filter(|side| *side != 1).collect::<Vec<_>>()[..] {
             [] => Some([1, 1]),
@@ -50,13 +50,13 @@ fn length(arrays: &[Array]) -> usize {
     shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
 
-/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`. The samples may be along either
-/// dimension of a matrix (its rows, if both fit). Arrays of another length are left out.
+/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, such as `q[0]`. The samples may be
+/// along either dimension of a matrix (along its rows, if both fit). Arrays of another length are omitted.
 #[derive(Debug)]
 pub(crate) struct ArrayTable {
     arrays: Vec<Array>,
     names: Option<Vec<String>>,
-    /// Array, offset and stride of each column.
+    /// Index of the array, and offset and stride in it, for each column.
     columns: Vec<[usize; 3]>,
     wanted: Vec<usize>,
     rows: usize,

@@ -34,7 +34,7 @@ impl<'a> Bytes<'a> {
         Some(taken)
     }
 
-    /// Moves to a multiple of `size`, a power of two, relative to the first byte.
+    /// Moves to the next multiple of `size`, a power of two, counted from the first byte.
     pub(crate) fn align(&mut self, size: usize) -> Option<()> {
         let padding = self.at.wrapping_neg() & (size - 1);
         self.take(padding).map(|_| ())
@@ -90,7 +90,7 @@ impl Number {
     }
 }
 
-/// IEEE 754 binary16.
+/// Converts an IEEE 754 number of 16 bits.
 fn half(bits: u16) -> f64 {
     let (sign, exponent, fraction) =
         (if bits >> 15 == 0 { 1.0 } else { -1.0 }, i32::from(bits >> 10 & 31), f64::from(bits & 1023));

@@ -22,7 +22,7 @@ const COPY_FIX: &str = "copy the whole trace again, all files with its name";
 struct Header {
     path: PathBuf,
     big_endian: bool,
-    /// Value of missing numbers.
+    /// Number that marks missing values.
     missing: Option<f64>,
     channels: Vec<Channel>,
 }
@@ -50,7 +50,7 @@ impl Channel {
         self.text(213) == "BLOCK"
     }
 
-    /// Offset and factor of its values.
+    /// Offset and factor of the values of a channel.
     fn scale(&self) -> [f64; 2] {
         [self.number(240).unwrap_or(0.0), self.number(241).unwrap_or(1.0)]
     }
@@ -83,7 +83,7 @@ impl Header {
         dynident_files::open(path)
             .and_then(|file| file.take(MAX_HEADER_BYTES).read_to_end(&mut bytes))
             .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-        // Controllers write Latin-1, in which every byte is valid.
+        // Controllers write Latin-1, in which every byte is a valid character.
         let text = String::from_utf8(bytes)
             .unwrap_or_else(|error| error.into_bytes().into_iter().map(char::from).collect::<String>());
         let mut header = Self { path: path.to_owned(), big_endian: false, missing: None, channels: Vec::new() };
@@ -112,8 +112,8 @@ impl Header {
         Ok(header)
     }
 
-    /// The file of a channel's numbers. If a trace was renamed, its headers contain the old name; a file with the name
-    /// of the header is then used.
+    /// The file with the numbers of a channel. The headers of a renamed trace contain the old file name; a file named
+    /// like the header is then used.
     fn data(&self, channel: &Channel) -> Result<PathBuf, FileError> {
         let stated = channel.text(211).rsplit(['/', '\\']).next().unwrap_or_default();
         let kind = Path::new(stated).extension().unwrap_or_default().to_string_lossy().into_owned();
@@ -126,14 +126,14 @@ impl Header {
         found.ok_or_else(missing)
     }
 
-    /// Start and step of the evenly spaced channel, and its length.
+    /// Start and step of the channel with evenly spaced times, and its length.
     fn clock(&self) -> Option<([f64; 2], Option<usize>)> {
         let channel = self.channels.iter().find(|channel| channel.is_implicit())?;
         Some((channel.scale(), channel.whole(220)))
     }
 }
 
-/// The headers of one trace: of all drives, `.._NextGenDrive#1.dat` etc., or only this one.
+/// The header files of one trace: of all drives, `.._NextGenDrive#1.dat` etc., or only this one.
 fn headers(path: &Path) -> Vec<PathBuf> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let kind = path.extension().unwrap_or_default().to_string_lossy().into_owned();
@@ -152,7 +152,7 @@ pub(crate) fn is_header(path: &Path) -> bool {
     read.is_ok() && begin == MAGIC
 }
 
-/// The headers of the trace of `path`, each followed by its files of numbers.
+/// The header files of the trace of `path`, each followed by its files of numbers.
 pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut files = Vec::new();
     for path in headers(path) {
@@ -232,7 +232,8 @@ fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>,
         .filter(|other| !other.is_implicit() && other.text(211) == channel.text(211) && other.is_block())
         .collect();
     let stride = if channel.is_block() { beside.len() } else { 1 };
-    // The documents define 222 as the step or as a header length; other values are ambiguous.
+    // The format documents define key 222 as the step or as the length of a header, so other values than these are
+    // ambiguous.
     if channel.is_block() && channel.whole(222).is_some_and(|step| step != 0 && step != stride) {
         return Err(broken(format!("222 is {}, but {stride} channels are interleaved", channel.text(222))));
     }

@@ -1,4 +1,4 @@
-//! Several recordings in one file: groups of arrays with the same names and different lengths.
+//! Several recordings (episodes) in one file: groups of arrays with the same names and different lengths.
 
 use crate::arrays::{Array, ArrayTable};
 use crate::error::FileError;
@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 /// Maximum depth of the groups that are compared.
 const MAX_DEPTH: usize = 8;
 
-/// The recordings of a file, each a group of columns.
+/// The episodes of a file, each a group of columns.
 #[derive(Debug)]
 pub(crate) struct EpisodeTable {
     names: Vec<String>,
     groups: Vec<ColumnGroup>,
     episodes: Vec<ArrayTable>,
-    /// Episode of the rows, and the place of its selected columns in a row.
+    /// Index of the current episode, and the place of its selected columns in a row.
     selected: usize,
     places: Vec<usize>,
     own: Vec<f64>,
@@ -31,7 +31,7 @@ fn split(name: &str, depth: usize) -> Option<(&str, &str)> {
 /// for a single recording.
 fn episodes(arrays: &[Array]) -> Vec<String> {
     for depth in 1..=MAX_DEPTH {
-        // By the group above and the name within: lengths of each group.
+        // Lengths of each group's array, by the parent group and the name of the array in the group.
         let mut siblings: BTreeMap<(&str, &str), BTreeMap<&str, usize>> = BTreeMap::new();
         for array in arrays {
             let Some((group, own)) = split(&array.name, depth) else { continue };
@@ -49,7 +49,7 @@ fn episodes(arrays: &[Array]) -> Vec<String> {
     Vec::new()
 }
 
-/// By the numbers in the names: `demo_2` before `demo_10`.
+/// Sorts names by the numbers in them: `demo_2` before `demo_10`.
 fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let number = |name: &str| {
         let begin = name.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
@@ -112,7 +112,8 @@ impl Table for EpisodeTable {
         self.groups.clone()
     }
 
-    /// Episodes have no common time: columns of others than that of the first column are missing.
+    /// Episodes have no common time, so selected columns of other episodes than that of the first column are missing
+    /// values.
     fn select(&mut self, columns: &[usize]) {
         let of = |column: usize| self.groups.iter().position(|group| group.columns.contains(&column));
         self.selected = columns.first().and_then(|column| of(*column)).unwrap_or(0);

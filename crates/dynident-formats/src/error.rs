@@ -1,4 +1,4 @@
-//! Errors between a file and its columns. Each message names the file, the place and the fix.
+//! Errors when columns are read from a file. Each message names the file, the place and the fix.
 
 use crate::kind::FileFormat;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub enum FileError {
         file: PathBuf,
         /// The format.
         format: &'static str,
-        /// Other contents.
+        /// What the file contains instead.
         found: String,
         /// The fix.
         fix: &'static str,
@@ -97,7 +97,7 @@ impl FileError {
     }
 }
 
-/// Escapes and shortens a text from a file for a message.
+/// Escapes control characters in a text from a file and shortens it for a message.
 pub(crate) fn visible(text: &str) -> String {
     const MAX_SHOWN: usize = 200;
     let shown: String = text

@@ -34,7 +34,8 @@ mod reading {
         let file = File::open_streaming(path).map_err(error)?;
         let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, budget, too_large: false };
         found.group(&file.root(), "", 0)?;
-        // Without its largest columns, the table could be mistaken for the whole recording.
+        // If the largest columns exceed the memory limit, the table is refused, because the rest could be mistaken
+        // for the whole recording.
         if let (true, Some(problem)) = (found.too_large, found.others.last()) {
             return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT_FIX));
         }
@@ -56,7 +57,7 @@ mod reading {
         others: Vec<String>,
         sets: usize,
         budget: Budget,
-        /// Whether a data set exceeds the memory limit; it is the last of `others`.
+        /// Whether a data set exceeds the memory limit; it is then the last of `others`.
         too_large: bool,
     }
 
@@ -69,7 +70,7 @@ mod reading {
         fn group(&mut self, group: &Group, at: &str, depth: usize) -> Result<(), FileError> {
             let name = |own: &str| if at.is_empty() { own.to_owned() } else { format!("{at}.{own}") };
             for own in group.datasets().map_err(|error| self.broken(at, &error))? {
-                // MATLAB stores the targets of references in #refs#.
+                // MATLAB stores the data that references (for example of cells) point to in the group #refs#.
                 if self.sets >= MAX_DATA_SETS || own.starts_with('#') {
                     continue;
                 }

@@ -126,7 +126,7 @@ fn lists(entries: &Map<String, Value>, path: &mut String, found: &mut Vec<Array>
     }
 }
 
-/// Removes the name of an object or list that contains all columns.
+/// Removes the name of an object or list from the names of all columns if it contains all of them.
 fn without_common_object(arrays: &mut [Array]) {
     let object = |array: &Array| Some(array.name.split_once('.')?.0.to_owned());
     if let Some(common) = arrays.first().and_then(object)
@@ -143,7 +143,7 @@ fn list(name: &str, items: &[Value]) -> Option<Array> {
         return (!values.is_empty()).then(|| vector(name.to_owned(), values));
     }
     let width = items.first()?.as_array()?.len();
-    // Grows with the numbers, not with the length of the first row.
+    // The list grows with the numbers, not with the length of the first row.
     let mut values = Vec::new();
     for item in items {
         let row = item.as_array().filter(|row| row.len() == width)?;
@@ -154,7 +154,7 @@ fn list(name: &str, items: &[Value]) -> Option<Array> {
     (width > 0).then(|| Array::row_major(name.to_owned(), [items.len(), width], values))
 }
 
-/// The values of `{"0": 0.5, "1": 0.7}`, an object from row to number, in the order of the rows.
+/// The values of an object from row number to value, such as `{"0": 0.5, "1": 0.7}`, in the order of the rows.
 fn by_row(entries: &Map<String, Value>) -> Option<Vec<f64>> {
     let row = |(row, value): (&String, &Value)| Some((row.parse::<u64>().ok()?, number(value)?));
     let mut rows = entries.iter().map(row).collect::<Option<Vec<_>>>()?;

@@ -1,5 +1,5 @@
-//! JSON lines: one object per line; columns are its numbers, named by their path, and by the names of joints in an
-//! array of the same object.
+//! JSON lines: one object per line. Columns are the numbers in the objects, named by their path; entries of an array
+//! are named by the joint names in another array of the same object.
 
 use crate::error::FileError;
 use crate::table::Table;
@@ -27,7 +27,7 @@ mod json {
     use std::io::Read;
     use std::path::PathBuf;
 
-    /// A single line may be a document.
+    /// Maximum length of the first line; a single line may be a whole document.
     const MAX_FIRST_LINE_BYTES: u64 = json_document::MAX_BYTES;
     const MAX_LINE_BYTES: u64 = 1 << 22;
     const SEARCHED_LINES: usize = 64;
@@ -76,7 +76,7 @@ mod json {
             });
             table.waiting.push_back((table.line, value));
         }
-        // A file with one line is a document, unless that gives no rows.
+        // A file with one line is read as a document, unless that gives no rows.
         if let [(_, value)] = table.waiting.make_contiguous()
             && let Some(document) = json_document::table(value)
         {
@@ -122,7 +122,7 @@ mod json {
                 }
                 return match serde_json::from_slice(text) {
                     Ok(value @ Value::Object(_)) => Ok(Some(value)),
-                    // A last line without a newline was truncated.
+                    // An invalid last line without a newline was truncated.
                     Err(_) if !line.ends_with(b"\n") && self.line > 1 => {
                         self.truncated = true;
                         Ok(None)
@@ -158,7 +158,7 @@ mod json {
             let Some(value) = self.next()? else { return Ok(false) };
             values.fill(f64::NAN);
             let mut path = core::mem::take(&mut self.number_path);
-            // Most lines have the same numbers in the same order, so try the expected name first.
+            // Most lines have the same numbers in the same order, so the expected name is tried first.
             let mut next = 0;
             flattened_message(&value, &mut path, &mut |name, number| {
                 let is_next = self.names.get(next).is_some_and(|expected| expected == name);

@@ -1,4 +1,4 @@
-//! The numbers of a JSON value by their paths: `arm.q[0]`, or `arm.q[elbow]` for a message with names.
+//! The numbers of a JSON value by their paths: `arm.q[0]`, or `arm.q[elbow]` for a message that contains names.
 
 use core::fmt::Write;
 use serde_json::Value;
@@ -8,12 +8,13 @@ pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut
     add(value, path, None, found);
 }
 
-/// As [`flattened`], for a message: the entries of its arrays have the names of the accompanying array of texts.
+/// Like [`flattened`], but for a message: the entries of its arrays are named by the array of texts in the same
+/// object.
 pub(crate) fn flattened_message(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
     add(value, path, Some(&[]), found);
 }
 
-/// The names of the entries of other arrays in `entries`, if there are any.
+/// Names for the entries of the arrays in `entries`, if there are any.
 fn names(entries: &serde_json::Map<String, Value>) -> Option<&[Value]> {
     let is_names = |key: &str| key == "name" || key == "names" || key.ends_with("_names");
     let lists = entries.iter().filter(|(key, _)| is_names(key)).filter_map(|(_, value)| value.as_array());
@@ -22,7 +23,7 @@ fn names(entries: &serde_json::Map<String, Value>) -> Option<&[Value]> {
     lists.into_iter().find(|list| !list.is_empty() && are_distinct(list)).map(Vec::as_slice)
 }
 
-/// Adds the numbers of `value`; `labels` are names of entries, `None` without them.
+/// Adds the numbers of `value`; `labels` are the names of entries, `None` without names.
 fn add(value: &Value, path: &mut String, labels: Option<&[Value]>, found: &mut impl FnMut(&str, f64)) {
     let length = path.len();
     match value {

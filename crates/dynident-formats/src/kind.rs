@@ -6,7 +6,7 @@
 pub enum FileFormat {
     /// Text; its table is parsed by the caller.
     Text,
-    /// Text with one line for each quantity.
+    /// Text with one line for each quantity instead of one for each sample.
     SidewaysText,
     /// Text with one value on each line and the shape of the array in its header.
     ValueList,

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const INFO_FILE: &str = "meta/info.json";
 const DOWNLOAD_FIX: &str = "download the complete data set (`hf download`, or `git lfs pull`)";
 
-/// The folder of the data set at `path`: itself, or that of its `meta/info.json`.
+/// The folder of the data set: `path` itself, or the folder that contains the given `meta/info.json`.
 pub(crate) fn folder(path: &Path) -> Option<&Path> {
     if path.ends_with(INFO_FILE) && path.is_file() {
         return path.parent()?.parent();
@@ -21,7 +21,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         let io = |source| FileError::Io { file: folder.to_owned(), source };
         let names = dynident_system::names(folder).map_err(io)?;
         let mut found: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
-        // Numbers in names have at least three or six digits, and more if needed.
+        // Numbers in file names have at least three or six digits, and more if needed, so shorter names come first.
         found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)
     };
@@ -70,7 +70,7 @@ mod reading {
         notes: Vec<String>,
         wanted: Vec<usize>,
         clock: Option<Clock>,
-        /// Columns that are read from each part, and one row of them.
+        /// Columns that are read from each part, and one row of their values.
         read: Vec<usize>,
         row: Vec<f64>,
         total_rows: Option<u64>,
@@ -158,7 +158,7 @@ mod reading {
     fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
         let io = |source| FileError::Io { file: path.to_owned(), source };
         let head = recognition::head(&mut BufReader::new(dynident_files::open(path).map_err(io)?)).map_err(io)?;
-        // The pointer to a file that was not downloaded is text.
+        // In place of a file that was not downloaded, Git LFS leaves a short text that refers to it.
         if !head.starts_with(b"PAR1") {
             let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();
             return Err(FileError::broken(
@@ -172,7 +172,7 @@ mod reading {
         parquet::open(path)
     }
 
-    /// Columns with list entries named by `features`: `action[elbow]` for `action[1]`.
+    /// Columns whose list entries are named by `features`: `action[elbow]` for `action[1]`.
     fn with_entries_named(columns: &[String], features: &Value) -> Vec<String> {
         let named = |column: &String| {
             let (feature, entry) = column.strip_suffix(']')?.rsplit_once('[')?;
@@ -191,7 +191,7 @@ mod reading {
         column.strip_prefix(feature).is_some_and(|rest| rest.starts_with('[') && !rest.contains('.'))
     }
 
-    /// A list of names, or the only list in a group: `{"motors": [..]}`.
+    /// Names of list entries: a list, or the only list in a group such as `{"motors": [..]}`.
     fn entry_names(names: &Value) -> Option<Vec<&str>> {
         let list = match names {
             Value::Object(group) if group.len() == 1 => group.values().next()?,
@@ -201,7 +201,7 @@ mod reading {
     }
 
     impl DataSet {
-        /// Reads a row of the parts into `row`; false at the end.
+        /// Reads the next row of the parts into `row`; false at the end.
         fn advance(&mut self) -> Result<bool, FileError> {
             while !self.part.next_row(&mut self.row)? {
                 let Some(path) = self.parts.get(self.current + 1) else { return Ok(false) };

@@ -4,23 +4,20 @@
 //! | format | columns | feature |
 //! | --- | --- | --- |
 //! | text, also in UTF-16, or compressed by gzip or Zstandard | parsed by the caller: [`Contents::Text`] | `gzip`, `zstd` |
-//! | text on its side: one line for each quantity; text with one value on each line and a shape | names of the lines;
-//! columns of the matrix | |
+//! | text with one line for each quantity; text with one value on each line and a shape | names of the lines; columns of the matrix | |
 //! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
 //! | JSON, one object per line or one document | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2, ROS 1 bag, ULog | numbers of messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
-//! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`,
-//! `parquet` |
+//! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`, `parquet` |
 //! | SAGE recording: a folder with `control.csv` and `state_motor.csv` | parsed and joined by the caller | |
 //! | Arrow: Feather, streams | as Parquet | `arrow` |
 //! | DIAdem header and numbers (KUKA trace) | channels, of all drives: `Istmoment[A3]` | |
-//! | MATLAB 4 and 5, Octave text, MATLAB 7.3 and HDF5 | variables of one length, matrices in either orientation | `gzip`,
-//! `hdf5` |
+//! | MATLAB 4 and 5, Octave text, MATLAB 7.3 and HDF5 | variables of one length, matrices in either orientation | `gzip`, `hdf5` |
 //!
-//! Columns that were recorded on different clocks (topics of a bag) are interpolated at the times of the first selected
-//! one: see [`Table::select`]. Indices in names are 0-based. Memory is limited by the length of the file and by
-//! [`ReadLimits`]. Checksums in a file are verified. Only regular files are read.
+//! Columns that were recorded with different clocks (topics of a bag) are interpolated at the times of the first
+//! selected column: see [`Table::select`]. Indices in names are 0-based. Memory is limited by the length of the file
+//! and by [`ReadLimits`]. Checksums in a file are verified. Only regular files are read.
 //!
 //! ```
 //! use dynident_formats::{Contents, open};
@@ -132,8 +129,8 @@ impl core::fmt::Debug for Contents {
     }
 }
 
-/// Opens the file at `path`, or the folder of a rosbag2 recording, a LeRobot data set or a SAGE recording, and detects
-/// its format. Of a SAGE recording it opens the measurements.
+/// Opens the file at `path`, or the folder of a rosbag2 recording, a LeRobot data set or a SAGE recording, and
+/// detects its format. For a SAGE recording, it opens the measurements.
 ///
 /// # Errors
 /// If it cannot be read, is not a regular file, has an unsupported format, is corrupt in the part that names its
@@ -142,7 +139,7 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
     open_within(path, &ReadLimits::default())
 }
 
-/// As [`open`], with other memory limits.
+/// Like [`open`], with other memory limits.
 ///
 /// # Errors
 /// As [`open`].
@@ -171,14 +168,15 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         FileFormat::ValueList => Contents::Table(value_list::open(path, &head, reader, budget)?),
         FileFormat::Text | FileFormat::SidewaysText if sideways::may_begin(&head) => {
             let Some(table) = sideways::open(path, reader, budget, sideways::Layout::Recognised)? else {
-                // A usual table whose rows begin with a text.
+                // A normal table whose rows begin with a text, not one line for each quantity.
                 let mut reader = BufReader::with_capacity(1 << 18, dynident_files::open(path).map_err(refused)?);
                 let head = recognition::head(&mut reader).map_err(refused)?;
                 return Ok(Opened { format, contents: Contents::Text(line_ends::plain(reader, &head)) });
             };
             return Ok(Opened { format: FileFormat::SidewaysText, contents: Contents::Table(table) });
         }
-        // The recognition of files never returns the formats of folders and of text on its side.
+        // The detection from file contents never returns the formats of folders or of text with one line for each
+        // quantity.
         FileFormat::Text | FileFormat::SidewaysText | FileFormat::Sage => {
             Contents::Text(line_ends::plain(reader, &head))
         }
@@ -201,7 +199,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         }
         FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
         FileFormat::Json => Contents::Table(json(path, reader)?),
-        // Not compressed: an array cannot be longer than its file.
+        // The file is not compressed, so an array cannot be longer than the file.
         FileFormat::Npy => Contents::Table(npy::open(path, reader, Budget::new(limits, u64::MAX))?),
         FileFormat::Npz => Contents::Table(npy::open_archive(path, budget)?),
         FileFormat::Mcap | FileFormat::Rosbag2 | FileFormat::Ros1Bag | FileFormat::Ulog => {
@@ -219,7 +217,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
     Ok(Opened { format, contents })
 }
 
-/// Opens a text table on its side, with one line for each quantity and one value for each sample. Lines need no names.
+/// Opens a text table with one line for each quantity and one value for each sample. Lines need no names.
 ///
 /// # Errors
 /// As [`open`], and lines of different length.
@@ -247,7 +245,7 @@ fn json(path: &Path, _: impl Read) -> Result<Box<dyn Table>, FileError> {
 }
 
 /// The files of `path`: itself, or the parts of a rosbag2 recording, a LeRobot data set, a SAGE recording or a DIAdem
-/// recording, with their metadata first.
+/// recording, starting with their metadata.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.

@@ -41,7 +41,7 @@ impl Budget {
         bytes.is_some_and(|bytes| bytes <= self.left)
     }
 
-    /// Takes memory.
+    /// Subtracts memory from the remaining budget.
     ///
     /// # Errors
     /// The problem, if less memory is left; `None` is an overflow.

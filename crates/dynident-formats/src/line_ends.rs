@@ -1,4 +1,4 @@
-//! Text in UTF-16, and text whose lines end with a carriage return alone, as UTF-8 with line feeds.
+//! Converts text in UTF-16, and text whose lines end with a carriage return only, to UTF-8 with line feeds.
 
 use std::io::{BufRead, Read, Result};
 
@@ -21,7 +21,7 @@ pub(crate) fn plain(mut reader: impl BufRead + Send + 'static, head: &[u8]) -> B
         return Box::new(reader);
     }
     if big_endian.is_some() {
-        // The mark is among the bytes of `head`, which the reader holds.
+        // The byte-order mark is one of the bytes of `head`, which are still in the reader.
         reader.consume(2);
     }
     Box::new(Plain { reader, big_endian, returns_only, high: None, ready: Vec::new(), at: 0 })
@@ -29,12 +29,12 @@ pub(crate) fn plain(mut reader: impl BufRead + Send + 'static, head: &[u8]) -> B
 
 struct Plain<R> {
     reader: R,
-    /// Byte order of UTF-16; `None` for bytes that are kept.
+    /// Byte order of UTF-16; `None` for text that is not in UTF-16.
     big_endian: Option<bool>,
     returns_only: bool,
-    /// The first half of a character outside of the basic plane.
+    /// First half of a character that UTF-16 stores in two parts.
     high: Option<u16>,
-    /// Converted bytes, and the number of those that were read.
+    /// Converted bytes, and how many of them were read.
     ready: Vec<u8>,
     at: usize,
 }

@@ -6,9 +6,9 @@ use crate::table::Table;
 use std::io::BufRead;
 use std::path::Path;
 
-/// A variable that only MATLAB reads.
+/// Description, for messages, of a variable that only MATLAB can read.
 pub(crate) const OBJECT: &str = "a MATLAB object (table, timetable, string ..)";
-/// How to save the numbers of an object.
+/// How to save the numbers of such a variable.
 pub(crate) const OBJECT_FIX: &str =
     "convert tables in MATLAB: `s = table2struct(T, \"ToScalar\", true); save(\"log.mat\", \"-struct\", \"s\")`";
 
@@ -110,7 +110,7 @@ mod reading {
     struct Tag {
         kind: u32,
         size: usize,
-        /// The content of an element of at most four bytes, which is inside the tag.
+        /// Content of an element of at most four bytes, which is stored in its tag.
         short: Option<[u8; 4]>,
     }
 
@@ -212,8 +212,8 @@ mod reading {
             Ok(values)
         }
 
-        /// Adds the arrays of a matrix element of `size` bytes: the array, or those of a struct's fields. `name` is the
-        /// path of a field.
+        /// Adds the arrays of a matrix element of `size` bytes: the array itself, or those of a struct's fields.
+        /// `name` is the path of the variable or field.
         fn matrix(
             &mut self,
             reader: &mut dyn Read,
@@ -221,7 +221,7 @@ mod reading {
             name: Option<String>,
             depth: usize,
         ) -> Result<(), Problem> {
-            // An empty field of a struct has no parts.
+            // An empty field of a struct has no content.
             if size == 0 {
                 return Ok(());
             }
@@ -250,7 +250,7 @@ mod reading {
                     let count = sides.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
                     let values = self.numbers(reader, count)?;
                     match Array::two_sides(&sides) {
-                        // The contents of objects, in a variable without a name.
+                        // MATLAB stores the contents of objects in a variable without a name.
                         _ if name.is_empty() => {}
                         Some(shape) => self.arrays.push(Array::column_major(name, shape, values)),
                         None => self.others.push(format!("{name}: more than two dimensions")),

@@ -18,7 +18,7 @@ const BLOCK_BYTES: usize = 1 << 16;
 struct Header {
     big_endian: bool,
     number: Number,
-    /// 0: numbers, 1: text, 2: sparse.
+    /// Type of the content: 0 for numbers, 1 for text, 2 for a sparse matrix.
     kind: u32,
     rows: u32,
     columns: u32,
@@ -29,7 +29,7 @@ struct Header {
 impl Header {
     fn parse(bytes: &[u8]) -> Option<Self> {
         let kind = Bytes::new(bytes.get(..4)?, false).u32()?;
-        // The type has four decimal digits: byte order, zero, precision, kind.
+        // The type consists of four decimal digits: byte order, zero, precision, content.
         let big_endian = kind > 9999;
         let mut words = Bytes::new(bytes.get(..HEADER_BYTES)?, big_endian);
         let kind = words.u32()?;
@@ -52,15 +52,15 @@ impl Header {
         is_valid.then_some(Self { big_endian, number, kind, rows, columns, is_complex, name_bytes })
     }
 
-    /// Bytes of the numbers.
+    /// Length of the numbers, bytes.
     fn bytes(&self) -> Option<u64> {
         let parts = if self.is_complex { 2 } else { 1 };
         (u64::from(self.rows) * u64::from(self.columns)).checked_mul(parts * self.number.size() as u64)
     }
 }
 
-/// Whether a file with these first bytes is of this format, which has no mark: a valid header, then a name that ends
-/// with NUL.
+/// Whether a file with these first bytes is of this format. The format has no magic bytes, so the header must be
+/// valid and be followed by a name that ends with NUL.
 pub(crate) fn begins(head: &[u8]) -> bool {
     let Some(header) = Header::parse(head) else { return false };
     let name = head.get(HEADER_BYTES..HEADER_BYTES + header.name_bytes as usize);

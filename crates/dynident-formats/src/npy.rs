@@ -16,7 +16,7 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 struct Header {
     /// Name (only in structured arrays), offset in an item, number of entries, and number type.
     fields: Vec<Field>,
-    /// Bytes per item.
+    /// Length of an item, bytes.
     item: usize,
     fortran: bool,
     shape: Vec<usize>,
@@ -48,8 +48,8 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
         found += 1;
         let mut contents = BufReader::new(zip::contents(path, &mut file, member)?);
         let arrays = arrays(path, FileFormat::Npz, name, &mut contents, &mut budget);
-        // Check the checksum first, because it explains other errors; an array that is too large is not read to its
-        // end.
+        // The checksum is checked first, because a wrong one explains other errors. An array that is too large is not
+        // read to its end.
         match arrays {
             Err(error @ FileError::Broken { fix: SPLIT_FIX, .. }) => return Err(error),
             arrays => {
@@ -132,7 +132,8 @@ fn arrays(
             shape.push(field.count);
         }
         let Some([rows, columns]) = Array::two_sides(&shape) else { continue };
-        // The entries of a field are contiguous for any order of items; a vector has one order only.
+        // The entries of a field are contiguous in any order of the items, and a vector has only one order. The order
+        // therefore matters only if an item is a single number.
         let column_major = header.fortran && field.count == 1;
         let make = if column_major { Array::column_major } else { Array::row_major };
         arrays.push(make(label, [rows, columns], values));
@@ -190,7 +191,7 @@ fn has_objects(descr: &Value) -> bool {
     }
 }
 
-/// Fields and bytes of an item.
+/// Fields and length (bytes) of an item.
 fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
     match descr {
         Value::Text(kind) => {
@@ -225,7 +226,8 @@ fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
     }
 }
 
-/// Parses a type such as `<f8`: number type, whether it is big-endian, and bytes; `None` as type for text etc.
+/// Parses a type such as `<f8`: number type, whether it is big-endian, and length in bytes. The number type is `None`
+/// for text and others.
 fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
     let (order, rest) = kind.split_at_checked(1)?;
     let (letter, size) = rest.split_at_checked(1)?;

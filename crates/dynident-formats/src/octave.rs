@@ -9,7 +9,7 @@ use crate::table::Table;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
-/// The first line of a file.
+/// The possible first lines of a file.
 pub(crate) const BEGINNINGS: [&[u8]; 2] = [b"# Created by Octave", b"% Created by Octave"];
 /// Maximum length of a line, bytes: a matrix of a hundred thousand columns has longer ones.
 const MAX_LINE_BYTES: u64 = 1 << 22;
@@ -119,8 +119,8 @@ impl<R: BufRead> Reader<R> {
         }
     }
 
-    /// A matrix with the numbers of its rows and columns, or with a list of its dimensions and a number on each line,
-    /// by columns.
+    /// Reads a matrix. It is stored with its numbers of rows and columns; or with a list of its dimensions and one
+    /// number on each line, column by column.
     fn matrix(&mut self, name: &str) -> Result<(), FileError> {
         const COPY: &str = "save it again";
         if !self.next_line()? {
@@ -151,7 +151,7 @@ impl<R: BufRead> Reader<R> {
     fn values(&mut self, name: &str, [rows, columns]: [usize; 2]) -> Result<(), FileError> {
         let count = rows.checked_mul(columns).ok_or_else(|| self.broken("it has too many numbers", SPLIT_FIX))?;
         let values = self.read_values(count)?;
-        // A row vector is a column of samples.
+        // A row vector becomes a column of samples.
         let shape = if rows == 1 { [columns, 1] } else { [rows, columns] };
         self.arrays.push(Array::row_major(name.to_owned(), shape, values));
         Ok(())

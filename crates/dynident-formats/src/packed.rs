@@ -5,7 +5,7 @@ use crate::kind::FileFormat;
 use std::io::Read;
 use std::path::Path;
 
-/// The decompressed bytes of `reader`, including several concatenated members.
+/// The decompressed bytes of `reader`; several compressed parts one after another are all read.
 pub(crate) fn unpacked(
     path: &Path,
     format: FileFormat,
@@ -18,7 +18,7 @@ pub(crate) fn unpacked(
         FileFormat::ZstdText => {
             let mut decoder = zstd::stream::read::Decoder::with_buffer(reader)
                 .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-            // 128 MiB, the default limit of `zstd`.
+            // 2^27 bytes = 128 MiB, the default limit of the program `zstd`.
             decoder.window_log_max(27).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
             Ok(Box::new(decoder))
         }

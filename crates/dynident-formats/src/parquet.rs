@@ -56,7 +56,7 @@ mod reading {
         group: usize,
         readers: Vec<(usize, ColumnReader)>,
         left_in_group: usize,
-        /// Rows of a block, row-major, selected columns only.
+        /// Rows of a block, row by row, with the selected columns only.
         block: Vec<f64>,
         rows_in_block: usize,
         next: usize,
@@ -72,7 +72,8 @@ mod reading {
         FileError::broken(path, FileFormat::Parquet, place, error.to_string(), "write or copy it again")
     }
 
-    /// Converts panics of the decoder to errors: it assumes valid lengths, which can only be checked by decompression.
+    /// Converts panics of the decoder to errors: it assumes valid lengths, which can only be checked by
+    /// decompression.
     fn guarded<T>(decode: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
         catch_unwind(AssertUnwindSafe(decode))
             .unwrap_or_else(|_| Err(ParquetError::EOF("its bytes do not match their description".into())))
@@ -135,7 +136,7 @@ mod reading {
             let schema = self.file.metadata().file_metadata().schema_descr_ptr();
             for index in 0..schema.num_columns() {
                 let column = schema.column(index);
-                // `observation.state.list.element`: the middle parts are defined by the format.
+                // In `observation.state.list.element`, the last two parts are defined by the format.
                 let parts = column.path().parts();
                 let list = column.max_rep_level() > 0;
                 let own = if list && parts.len() > 2 { &parts[..parts.len() - 2] } else { parts };
@@ -342,7 +343,7 @@ mod reading {
             read.rows += records;
         }
         let count = definitions.len().max(repetitions.len());
-        // Columns without levels have a value in every row.
+        // A column without definition and repetition levels has a value in every row.
         let count = if count == 0 { values.len() } else { count };
         let level = |levels: &[i16], at: usize| levels.get(at).copied().unwrap_or(0);
         read.levels = (0..count).map(|at| (level(&definitions, at), level(&repetitions, at))).collect();

@@ -1,5 +1,5 @@
-//! Checks the pages of a Parquet column, because the reader does not: a page must not be shorter than its levels, nor
-//! use a missing dictionary.
+//! Checks the pages of a Parquet column, because the Parquet library does not: a page must not be shorter than its
+//! levels, and must not use a missing dictionary.
 
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
@@ -22,7 +22,7 @@ impl CheckedPages {
         Self { inner, highest: [column.max_rep_level(), column.max_def_level()], has_dictionary: false }
     }
 
-    /// Checks the length of the levels and the presence of the dictionary.
+    /// Checks the length of the levels and that the dictionary is present.
     fn check(&mut self, page: &Page) -> Result<()> {
         let (fits, encoding) = match page {
             Page::DataPage { buf, num_values, encoding, rep_level_encoding, def_level_encoding, .. } => {
@@ -99,7 +99,7 @@ impl PageReader for CheckedPages {
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
-        // The reader keeps a skipped dictionary until a page needs it.
+        // The library keeps a skipped dictionary until a page needs it.
         self.has_dictionary |= self.inner.peek_next_page()?.is_some_and(|page| page.is_dict);
         self.inner.skip_next_page()
     }

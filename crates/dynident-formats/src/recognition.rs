@@ -15,7 +15,8 @@ const HEAD_BYTES: usize = 1 << 16;
 
 /// The first bytes of a stream, without consuming them; may be shorter than [`HEAD_BYTES`].
 pub(crate) fn head<R: Read>(reader: &mut BufReader<R>) -> std::io::Result<Vec<u8>> {
-    // A single fill of the buffer; a compressed stream may return fewer bytes, which suffice for the detection.
+    // The buffer is filled only once. A compressed stream may then return fewer bytes, which suffice for the
+    // detection.
     let filled = reader.fill_buf()?;
     Ok(filled[..filled.len().min(HEAD_BYTES)].to_vec())
 }
@@ -37,9 +38,9 @@ const SUPPORTED: &[(&[u8], FileFormat)] = &[
     (b"\x28\xB5\x2F\xFD", FileFormat::ZstdText),
 ];
 
-/// A format that is recognised and not read.
+/// A format that is recognised, but that this crate does not read.
 struct Unsupported {
-    /// First bytes.
+    /// Bytes with which a file of the format starts.
     begins: &'static [u8],
     /// Bytes among the first bytes of the file; empty for no condition.
     contains: &'static [u8],
@@ -109,7 +110,7 @@ fn contains(head: &[u8], wanted: &[u8]) -> bool {
 /// If it is a known unsupported format.
 pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileError> {
     let is_like = |format: &&Unsupported| head.starts_with(format.begins) && contains(head, format.contains);
-    // Archives of other formats before NumPy's, which have the same first bytes.
+    // Archives of other formats are tested before NumPy's, because they have the same first bytes.
     let other = UNSUPPORTED.iter().find(is_like);
     if let Some((_, format)) = SUPPORTED.iter().find(|(begins, _)| head.starts_with(begins))
         && other.is_none_or(|other| other.contains.is_empty())
@@ -161,11 +162,11 @@ fn is_json_line(head: &[u8]) -> bool {
     let head = head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head).trim_ascii_start();
     let line = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let begins = line.strip_prefix(b"{").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"\""));
-    // A line longer than the tested bytes has no end here.
+    // The end of a line that is longer than the tested bytes is unknown.
     begins && (line.len() == head.len() && head.len() >= HEAD_BYTES / 2 || line.trim_ascii_end().ends_with(b"}"))
 }
 
-/// Whether these first bytes are those of a document over several lines, or of a list of objects.
+/// Whether these first bytes are those of a JSON document over several lines, or of a list of objects.
 fn is_json_document(head: &[u8]) -> bool {
     let head = head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head).trim_ascii_start();
     match head {

@@ -10,7 +10,7 @@ pub const SAGE_FILES: [&str; 2] = ["control.csv", "state_motor.csv"];
 const JOINTS: &str = "joint_list.txt";
 const MAX_JOINTS_BYTES: u64 = 1 << 20;
 
-/// Whether `path` is the folder of a recording.
+/// Whether `path` is the folder of a SAGE recording.
 pub(crate) fn is_recording(path: &Path) -> bool {
     SAGE_FILES.iter().all(|name| path.join(name).is_file())
 }

@@ -1,4 +1,4 @@
-//! Text tables on their side: one line for each quantity, its name (if it has one) and then its values.
+//! Text tables with one line for each quantity: its name (if it has one), followed by its values.
 
 use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
 use crate::error::FileError;
@@ -10,32 +10,32 @@ use std::collections::HashSet;
 use std::io::{BufRead, Read};
 use std::path::Path;
 
-/// Maximum length of a line, bytes: ten million values.
+/// Maximum length of a line, bytes; enough for ten million values.
 const MAX_LINE_BYTES: u64 = 1 << 28;
-/// Number of values that the first line must have to be recognised.
+/// Number of values that the first line must have so that the format is detected.
 const MIN_VALUES: usize = 8;
 
-/// Whether the text must show that it is on its side.
+/// How it is known that a text has one line for each quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// It is recognised: every line has a different name, and there are more values than lines.
+    /// It is detected: every line has a different name, and there are more values than lines.
     Recognised,
-    /// The caller states it.
+    /// The caller says so.
     Stated,
 }
 
-/// Whether these first bytes may be those of such a table: a name, and then numbers only.
+/// Whether these first bytes may be those of such a table: a name, and then only numbers.
 pub(crate) fn may_begin(head: &[u8]) -> bool {
     let Some(line) = plain_lines(head).next() else { return false };
     let delimiter = delimiter(line);
     let mut fields = line.split(|byte| *byte == delimiter);
     let is_named = fields.next().is_some_and(|name| is_name(unquoted(name)));
-    // The last field may be cut off.
+    // The last field may be incomplete, because only the first bytes of the file are tested.
     let values: Vec<&[u8]> = fields.take(MIN_VALUES + 1).collect();
     is_named && values.len() > MIN_VALUES && values[..MIN_VALUES].iter().all(|text| number(text, delimiter).is_some())
 }
 
-/// The table of a text; `None` if it is not recognised as one.
+/// The table in a text; `None` if the text is not recognised as such a table.
 ///
 /// # Errors
 /// As [`open`](crate::open); for a stated layout also lines of different length.
@@ -128,7 +128,8 @@ fn quantity(line: &[u8], delimiter: u8, budget: &mut Budget) -> Result<Quantity,
     Ok(Ok((name, values)))
 }
 
-/// Tabs and semicolons first, because their files may have decimal commas.
+/// Delimiter of the fields in a line. Tabs and semicolons are tried first, because files with them may have decimal
+/// commas.
 fn delimiter(line: &[u8]) -> u8 {
     b"\t;,".iter().copied().find(|delimiter| line.contains(delimiter)).unwrap_or(b' ')
 }
@@ -140,7 +141,7 @@ fn unquoted(field: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether a field is the name of a quantity: text that begins with a letter or is a topic.
+/// Whether a field is the name of a quantity: text that begins with a letter, or a ROS topic.
 fn is_name(field: &[u8]) -> bool {
     field.first().is_some_and(|first| first.is_ascii_alphabetic() || matches!(first, b'/' | b'_') || *first >= 0x80)
         && number(field, b';').is_none()

@@ -7,7 +7,7 @@ use core::ops::Range;
 /// Columns that were recorded together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnGroup {
-    /// Name in messages, such as a topic; `None` for a single group.
+    /// Name of the group in messages, such as a topic; `None` for a single group.
     pub name: Option<String>,
     /// Range of its columns.
     pub columns: Range<usize>,
@@ -15,7 +15,7 @@ pub struct ColumnGroup {
     pub time: Option<usize>,
 }
 
-/// For each of `width` columns, its index among the selected ones.
+/// Index of each of `width` columns among the selected columns.
 #[cfg(any(feature = "json", feature = "parquet"))]
 pub(crate) fn slots(width: usize, columns: &[usize]) -> Vec<Option<usize>> {
     let mut slot_of = vec![None; width];
@@ -25,7 +25,7 @@ pub(crate) fn slots(width: usize, columns: &[usize]) -> Vec<Option<usize>> {
     slot_of
 }
 
-/// One pass over a table, from its first row to its last.
+/// A table of columns that is read once, from its first row to its last.
 pub trait Table: fmt::Debug + Send {
     /// Number of columns.
     fn width(&self) -> usize;
@@ -38,11 +38,12 @@ pub trait Table: fmt::Debug + Send {
         vec![ColumnGroup { name: None, columns: 0..self.width(), time: None }]
     }
 
-    /// Selects the columns, without duplicates, that [`next_row`](Self::next_row) returns in this order. Called before
-    /// the first row; by default the columns of the first group are selected.
+    /// Selects the columns, without duplicates, that [`next_row`](Self::next_row) returns, in this order. It must be
+    /// called before the first row is read; by default the columns of the first group are selected.
     ///
-    /// Rows are those of the group of the first column. Columns of other groups are interpolated linearly in time. Rows
-    /// before the start or after the end of such a group are left out, and values in a gap of it are NaN.
+    /// The rows are those of the group of the first selected column. Columns of other groups are interpolated
+    /// linearly in time. Rows before the start or after the end of such a group are omitted, and values in a gap of
+    /// it are NaN.
     fn select(&mut self, columns: &[usize]);
 
     /// Reads one row: a number for each selected column, NaN if missing; false at the end.
@@ -57,8 +58,8 @@ pub trait Table: fmt::Debug + Send {
     /// If the file is corrupt at this row.
     fn skip_row(&mut self) -> Result<bool, FileError>;
 
-    /// Reads all remaining rows in their order in the file and passes each to `each` with its group number and the
-    /// columns of the group. Must not follow [`select`](Self::select).
+    /// Reads all remaining rows in their order in the file and passes each to `each`, with its group number and the
+    /// columns of the group. [`select`](Self::select) must not be called before.
     ///
     /// # Errors
     /// If the file is corrupt; the rows before the error were passed on.
@@ -72,7 +73,7 @@ pub trait Table: fmt::Debug + Send {
         Ok(())
     }
 
-    /// Contents that are not exposed as columns, with the reason for each.
+    /// Parts of the file that are not available as columns, with the reason for each.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }

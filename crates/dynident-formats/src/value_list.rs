@@ -19,9 +19,9 @@ const COPY: &str = "write or copy the file again";
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Shape {
     sides: Vec<usize>,
-    /// Whether values are in the order of columns, otherwise of rows.
+    /// Whether values are stored column by column, otherwise row by row.
     by_columns: bool,
-    /// Whether the first line that is not a comment states the shape.
+    /// Whether the first line that is not a comment contains the shape.
     on_first_line: bool,
 }
 
@@ -49,12 +49,12 @@ fn shape(head: &[u8]) -> Option<Shape> {
             ["fortran", "column", "order: f", "order=f", "order='f'"].iter().any(|word| rest.contains(word));
         return is_single(&words).then_some(Shape { sides, by_columns, on_first_line: false });
     }
-    // Two whole numbers, and then one number on each line, which is no table.
+    // Two whole numbers on the first line and then one number on each line: this cannot be a table.
     let sides = sides(&words).filter(|sides| sides.len() == 2 && sides.iter().all(|side| *side > 0))?;
     is_single(&next).then_some(Shape { sides, by_columns: false, on_first_line: true })
 }
 
-/// Whether these are the first bytes of such a file.
+/// Whether these are the first bytes of a file of this format.
 pub(crate) fn begins(head: &[u8]) -> bool {
     shape(head).is_some()
 }
@@ -121,7 +121,7 @@ pub(crate) fn open(
     Ok(Box::new(table.nameless()))
 }
 
-/// The kind of numbers and the symmetry in the header of Matrix Market.
+/// The type of numbers and the symmetry in the header of Matrix Market.
 fn plain_kind(head: &[u8]) -> Option<String> {
     let line = head.strip_prefix(MATRIX_MARKET)?.split(|byte| *byte == b'\n').next()?;
     let kind = String::from_utf8_lossy(line).to_ascii_lowercase();

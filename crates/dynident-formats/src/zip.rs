@@ -88,7 +88,7 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
         let (tag, length) = (extra.u16()?, extra.u16()?);
         let mut field = Bytes::new(extra.take(usize::from(length))?, false);
         if tag == 1 {
-            // Only sizes that exceed 32 bits are present, in this order.
+            // Only the sizes that exceed 32 bits are present, in this order.
             if unpacked == u32::MAX {
                 field.u64()?;
             }
@@ -103,7 +103,7 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
     Some(Member { name, method, crc, packed, header })
 }
 
-/// Decompressed bytes of a member, with a running checksum.
+/// Reads the decompressed bytes of a member and computes their checksum.
 pub(crate) struct Contents<'a> {
     reader: Box<dyn Read + 'a>,
     hasher: crc32fast::Hasher,
@@ -120,7 +120,7 @@ impl Read for Contents<'_> {
 }
 
 impl Contents<'_> {
-    /// Reads to the end and compares the checksum with that of the list.
+    /// Reads to the end and compares the checksum with that in the directory of the archive.
     ///
     /// # Errors
     /// If they differ, because bytes were changed.

@@ -1,6 +1,6 @@
 //! Stages after the estimate: physically consistent parameters, examination, held-out tests, diagnosis.
 
-use crate::changes::{DescriptionDifferences, RestoredBody, knowledge_of, restored_errors};
+use crate::changes::{Differences, RestoredBody, knowledge_of, restored_errors};
 use crate::consistent::{
     ConsistencyError, ConsistencySettings, ParameterInterval, consistent_intervals, consistent_with_estimate,
     inconsistent_nominal_bodies, nearest_to_nominal, parameter_std,
@@ -39,7 +39,7 @@ pub struct ConsistentParameters {
     /// for bodies without nominal inertia.
     pub parameter_std: Vec<Option<f64>>,
     /// Which bodies differ from the robot description; `None` without a description of all bodies.
-    pub differences: Option<DescriptionDifferences>,
+    pub differences: Option<Differences>,
     /// Whether the physically consistent set follows an explanation of these differences by one or two bodies, so that
     /// the other bodies keep the values of the description.
     pub follows_explanation: bool,
@@ -305,13 +305,13 @@ fn description_differences(
     robot: &ParametricModel,
     arm: &Estimate,
     knowledge: &ConsistencySettings,
-) -> Option<DescriptionDifferences> {
+) -> Option<Differences> {
     let is_fixed = |row: &usize| arm.rank.fixed.iter().any(|fixed| fixed.column == *row);
     let rows: Vec<usize> = (0..robot.base().count()).filter(|row| !is_fixed(row)).collect();
     let values = DVector::from_fn(rows.len(), |k, _| arm.values[rows[k]]);
     let all = arm.joint_covariance();
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| all[(rows[a], rows[b])]);
-    DescriptionDifferences::new(robot, &rows, &values, &covariance, knowledge).ok().flatten()
+    Differences::from_description(robot, &rows, &values, &covariance, knowledge).ok().flatten()
 }
 
 /// Whether a physically consistent set that follows an explanation (`followed`) fits the logs as well as the set

@@ -43,7 +43,7 @@ pub struct DecisionThresholds {
 }
 
 /// Thresholds for bodies that differ from the robot description
-/// ([`DescriptionDifferences`](crate::changes::DescriptionDifferences)).
+/// ([`Differences`](crate::changes::Differences)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DescriptionThresholds {

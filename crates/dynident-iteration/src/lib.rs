@@ -1,10 +1,10 @@
-//! Iterative identification: run the robot, identify, load the better model into the controller, run again. Supports
-//! robots outside of this process and stores every run.
+//! Iterative identification: run the robot, identify its parameters, load the better model into the controller, run
+//! again. The robot can be outside of this process, and every run is stored.
 //!
 //! | task | use |
 //! | --- | --- |
 //! | the loop | [`iterate()`] of an [`IterationTask`] with [`IterationSettings`] |
-//! | the trajectory of a run and the rows that are used | [`Leg`] |
+//! | one trajectory of a run, and the rows that are used | [`Leg`] |
 //! | a simulated robot | [`SimulatedRobot`] |
 //! | a program that uses the line protocol, or a person with a folder | [`robot`] |
 //! | stops, permissions, limits of every sample | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
@@ -12,11 +12,11 @@
 //! | rehearsal of a motion in simulation before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
 //! | paths from a home posture to the motion and back | [`HomeSettings`] in [`SafetySettings`] |
 //! | a custom robot | a type that implements [`Robot`] |
-//! | identification of one run | [`identify_run`]: all joints at once, or joint by joint from tip to base as in the paper |
-//! | joint identification of several runs | [`identify_runs`], each weighted by its own noise |
-//! | unmet conditions | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`UnmetCondition`]) |
-//! | the next run | [`Iteration::next`], a pure function of the records: controller and model, rejection of worse runs, convergence |
-//! | a next motion that excites the least known directions | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
+//! | identification of one run | [`identify_run`]: all joints at once, or joint by joint from tip to base |
+//! | one identification from several runs together | [`identify_runs`], each weighted by its own noise |
+//! | conditions that prevent convergence | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`UnmetCondition`]) |
+//! | the next run | [`Iteration::next`], a pure function of the stored records: controller and model, rejection of worse runs, convergence |
+//! | a next motion that excites the least known combinations of parameters | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
 //! | storage, and resuming with the same result | [`IterationStore`] |
 //!
 //! The crate `dynident` provides it as `dynident iterate`, with trajectories, robots and controllers from a study file.

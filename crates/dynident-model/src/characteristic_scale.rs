@@ -10,11 +10,11 @@ const TIME_SCALE_SQUARED: f64 = 8.0;
 
 /// Scale factors of time and length relative to a typical arm of 1.2 m.
 ///
-/// Default times, lengths and velocities (such as the largest torque lag, or the width of the Coulomb step) are given
-/// for a typical arm and multiplied by these factors. Geometrically similar robots, from a watch to a crane, therefore
-/// give similar results. The characteristic time is that of a pendulum, `√(8 l / g)`: length and gravity are the only
-/// data of a robot description that determine a time. The factors also make the result independent of the units of
-/// length and time in the description.
+/// Default times, lengths and velocities (such as the largest torque lag, or the velocity range in which Coulomb
+/// friction changes its sign) are defined for a typical arm and multiplied by these factors. Geometrically similar
+/// robots, from a watch to a crane, therefore give similar results. The characteristic time is that of a pendulum,
+/// `√(8 l / g)`: length and gravity are the only data of a robot description that determine a time. The factors also
+/// make the result independent of the units of length and time in the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CharacteristicScale {
     /// Scale of time; 1 for an arm of 1.2 m.
@@ -50,8 +50,8 @@ impl CharacteristicScale {
         usual_hz / self.time
     }
 
-    /// Scales a sampling rate of the typical arm by the nearest power of two, Hz. For arms of 0.6 to 2.4 m it is
-    /// `usual_hz`.
+    /// Scales a sampling rate of the typical arm by the nearest power of two, Hz. For arms of 0.6 to 2.4 m the result
+    /// is `usual_hz`.
     pub fn round_hertz(self, usual_hz: f64) -> f64 {
         usual_hz * self.time.log2().round().exp2().recip()
     }
@@ -78,8 +78,8 @@ impl CharacteristicScale {
 }
 
 impl Model {
-    /// Length of the longest chain from the first joint to a tip, m: the distances between the joint frames, and to the
-    /// farthest link fixed to the last one. The position of the base has no influence.
+    /// Length of the longest chain from the first joint to a tip, m: the sum of the distances between the joint
+    /// frames, and from the last joint to the farthest link fixed to it. The position of the base has no influence.
     pub fn arm_m(&self) -> f64 {
         let mut lengths: Vec<f64> = Vec::with_capacity(self.body_count());
         for joint in self.tree_joints() {

@@ -7,14 +7,14 @@ use dynident_lanes::Scalar;
 /// Source joints with multipliers, and an offset.
 type Law = (Vec<(usize, f64)>, f64);
 
-/// Linear map from the degrees of freedom to the joints of the tree: `q_tree = G q + q_0`, so `dq_tree = G dq`,
-/// `ddq_tree = G ddq`, and by virtual power `tau = Gᵀ tau_tree`.
+/// Linear map from the degrees of freedom to the joints of the tree: `q_tree = G q + q_0`. Therefore `dq_tree = G
+/// dq`, `ddq_tree = G ddq`, and, by virtual power, `tau = Gᵀ tau_tree`.
 ///
 /// `G` has one row per joint of the tree; the row of an independent joint has a single 1. `G` is constant, so a closed
 /// chain is represented exactly only if its passive joints follow linearly (parallelograms).
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointCoupling {
-    /// Tree joint of each degree of freedom.
+    /// Index of the tree joint that each degree of freedom drives.
     driving: Vec<usize>,
     /// Nonzero entries of `G` by tree joint: degree of freedom, multiplier.
     rows: Vec<Vec<(usize, f64)>>,
@@ -22,8 +22,8 @@ pub struct JointCoupling {
 }
 
 impl JointCoupling {
-    /// Builds the coupling from [`Joint::mimic`]; `None` if all joints are independent. A joint whose source is not in
-    /// the tree is independent.
+    /// Builds the coupling from [`Joint::mimic`]; `None` if all joints are independent. A joint that follows a joint
+    /// outside the tree is independent.
     ///
     /// # Errors
     /// A cycle of mimic joints, or a multiplier or offset that is not finite.
@@ -52,7 +52,7 @@ impl JointCoupling {
         for (dof, &joint) in driving.iter().enumerate() {
             rows[joint] = Some(vec![(dof, 1.0)]);
         }
-        // Each round resolves at least one follower whose sources are known; otherwise there is a cycle.
+        // Each round resolves at least one follower whose source joints are known; otherwise there is a cycle.
         while let Some(first) = rows.iter().position(Option::is_none) {
             let mut settled = false;
             for joint in 0..tree.len() {
@@ -78,17 +78,17 @@ impl JointCoupling {
         Ok(Some(Self { driving, rows: rows.into_iter().flatten().collect(), offsets }))
     }
 
-    /// Degrees of freedom: columns of `G`.
+    /// Number of degrees of freedom (columns of `G`).
     pub fn dof(&self) -> usize {
         self.driving.len()
     }
 
-    /// Joints of the tree: rows of `G`.
+    /// Number of joints of the tree (rows of `G`).
     pub fn joints(&self) -> usize {
         self.rows.len()
     }
 
-    /// Tree joint of each degree of freedom, ascending.
+    /// Index of the tree joint that each degree of freedom drives, ascending.
     pub fn driving(&self) -> &[usize] {
         &self.driving
     }
@@ -98,7 +98,7 @@ impl JointCoupling {
         &self.rows[tree_joint]
     }
 
-    /// `q_0` of a tree joint, rad or m.
+    /// Offset `q_0` of a tree joint, rad or m.
     pub fn offset(&self, tree_joint: usize) -> f64 {
         self.offsets[tree_joint]
     }
@@ -148,7 +148,7 @@ impl JointCoupling {
         }
     }
 
-    /// [`project_matrix`](Self::project_matrix) of a symmetric matrix; the result is exactly symmetric.
+    /// Computes [`project_matrix`](Self::project_matrix) of a symmetric matrix; the result is exactly symmetric.
     ///
     /// # Panics
     /// If a matrix is not square over its joints.

@@ -6,9 +6,9 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DhConvention {
-    /// `Rz(θ) Tz(d) Tx(a) Rx(α)` (Denavit and Hartenberg 1955; Paul 1981).
+    /// Frame transformation `Rz(θ) Tz(d) Tx(a) Rx(α)` (Denavit and Hartenberg 1955; Paul 1981).
     Standard,
-    /// `Rx(α) Tx(a) Rz(θ) Tz(d)` (Craig 1986; Khalil and Kleinfinger 1986).
+    /// Frame transformation `Rx(α) Tx(a) Rz(θ) Tz(d)` (Craig 1986; Khalil and Kleinfinger 1986).
     Modified,
 }
 

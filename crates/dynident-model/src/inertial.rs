@@ -3,16 +3,17 @@
 use crate::spatial::{Mat3, Transform, Vec3};
 use nalgebra::{Matrix3, Matrix4};
 
-/// Largest length, angle, mass or inertia accepted in a robot description. Larger numbers are mistakes, and their
-/// products would exceed the range of `f64`.
+/// Largest length, angle, mass or inertia that is accepted in a robot description. Larger numbers are mistakes, and
+/// their products would exceed the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
 
-/// Names of the ten parameters in the project's order (order `p_i` of the paper, with its misprint corrected).
+/// Names of the ten inertial parameters of a body, in the order of [`InertialParameters`].
 pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
-/// `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]` of one rigid body: mass in kg, first moment in kg m,
-/// inertia **about the origin of the body frame** in kg m², all in the axes of the body frame. `r` is the centre of
-/// mass and the products of inertia are entries of the inertia matrix: `I_xy = -∫ x y dm`.
+/// The ten inertial parameters of one rigid body, `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]`:
+/// mass in kg, first moment in kg m, inertia **about the origin of the body frame** in kg m². All are in the axes of
+/// the body frame. `r` is the centre of mass. The products of inertia are entries of the inertia matrix: `I_xy = -∫ x
+/// y dm`.
 #[doc(alias("barycentric parameters", "standard parameters", "inertia tensor"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertialParameters(pub [f64; 10]);
@@ -63,7 +64,8 @@ impl InertialParameters {
         Some(self.inertia_at_origin() - shift)
     }
 
-    /// Mass, centre of mass and inertia about it, if the body is physically consistent and within the magnitude limit.
+    /// Mass, centre of mass and inertia about the centre of mass, if the body is physically consistent and within the
+    /// magnitude limit.
     pub(crate) fn consistent_about_com(&self) -> Option<(f64, Vec3, Mat3)> {
         let (com, inertia, [a, b, c]) = (self.com_m()?, self.inertia_at_com()?, self.principal_moments()?);
         let mass = self.mass_kg();
@@ -73,7 +75,7 @@ impl InertialParameters {
 
     /// The same body in another frame; `frame_from_body` maps from the current frame to the new one.
     pub fn expressed_in(&self, frame_from_body: &Transform) -> Self {
-        // Second moments Σ = ∫ p pᵀ dm transform like outer products, so that the centre of mass is not needed.
+        // Second moments Σ = ∫ p pᵀ dm transform like outer products, so the centre of mass is not needed.
         let (r, t, m) = (&frame_from_body.rotation, frame_from_body.translation, self.0[0]);
         let h = r.mul_vec(self.first_moment());
         let inertia = self.inertia_at_origin();
@@ -89,8 +91,8 @@ impl InertialParameters {
         Self(core::array::from_fn(|k| self.0[k] + other.0[k]))
     }
 
-    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`: the body is physically consistent
-    /// exactly when `P` is positive (semi-)definite (Traversaro et al. 2016; Wensing, Kim and Slotine 2018).
+    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`. The body is physically consistent
+    /// if and only if `P` is positive (semi-)definite (Traversaro et al. 2016; Wensing, Kim and Slotine 2018).
     pub fn pseudo_inertia(&self) -> Matrix4<f64> {
         let i = self.inertia_at_origin().0;
         let half_trace = 0.5 * (i[0][0] + i[1][1] + i[2][2]);

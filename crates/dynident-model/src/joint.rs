@@ -6,9 +6,9 @@ use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 /// The kinds of joint with a degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
-    /// Turns about its axis, between limits; position in radians.
+    /// Rotates about its axis, between limits; position in radians.
     Revolute,
-    /// Turns about its axis without limits; position in radians.
+    /// Rotates about its axis without limits; position in radians.
     Continuous,
     /// Slides along its axis; position in metres.
     Prismatic,
@@ -25,7 +25,7 @@ impl JointKind {
     }
 }
 
-/// Limits of a joint, as far as the robot description states them: rad or m, rad/s or m/s, Nm or N.
+/// Limits of a joint, if the robot description contains them: rad or m, rad/s or m/s, Nm or N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointLimits {
     /// Lowest position, rad or m.
@@ -38,7 +38,7 @@ pub struct JointLimits {
     pub effort: Option<f64>,
 }
 
-/// A spring at a joint; the drive has to give the torque `τ = stiffness (q - reference)`.
+/// A spring at a joint. The drive has to provide the torque `τ = stiffness (q - reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSpring {
     /// Stiffness, Nm/rad (N/m).
@@ -47,8 +47,8 @@ pub struct JointSpring {
     pub reference: f64,
 }
 
-/// A joint that follows others: `q = Σ multiplier · q_source + offset`. URDF's `mimic` has one source; the passive
-/// joints of a parallelogram may have two.
+/// Law of a joint that follows others: `q = Σ multiplier · q_source + offset`. URDF's `mimic` has one source; the
+/// passive joints of a parallelogram can have two.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
     /// Source joints.
@@ -78,8 +78,8 @@ impl Mimic {
     }
 }
 
-/// A joint of the tree. The frame of its child body is the joint frame. At position zero its pose in the parent body's
-/// frame is `placement`; it moves by `q` about (along) `axis`.
+/// A joint of the tree. The frame of its child body is the joint frame. At position zero the pose of the joint frame
+/// in the parent body's frame is `placement`; the frame moves by `q` about (along) `axis`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
@@ -103,14 +103,14 @@ pub struct Joint {
     /// Spring in the robot description. The rigid-body dynamics do not include it; it is a torque term,
     /// [`Declared::springs`](crate::terms::Declared::springs).
     pub spring: Option<JointSpring>,
-    /// Sources, if the joint is a mimic joint; see [`JointCoupling`](crate::JointCoupling). A joint whose source is not
-    /// in the model is independent.
+    /// Law of the joint if it follows other joints (mimic joint); see [`JointCoupling`](crate::JointCoupling). A
+    /// joint whose source is not in the model is independent.
     pub mimic: Option<Mimic>,
 }
 
-/// The numbers of one joint in the form that algorithms use. A revolute joint has `parent_from_child` with `R(q) =
-/// constant + cosine · cos q + sine · sin q` and a fixed translation; a prismatic joint has `R = constant` and
-/// `translation + slide · q`.
+/// The numbers of one joint in the form that algorithms use. A revolute joint has the rotation `R(q) = constant +
+/// cosine · cos q + sine · sin q` in `parent_from_child`, and a constant translation. A prismatic joint has `R =
+/// constant` and the translation `translation + slide · q`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMap {
     /// Index of the parent body, or `None` for the base.
@@ -129,15 +129,15 @@ pub struct JointMap {
     pub translation: Vec3,
     /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
-    /// Axes of parent and child (0, 1, 2 for x, y, z) along which the axis of a revolute joint is aligned, if it is
-    /// aligned in both frames. The rotation then has five nonzero entries. The tolerance is 1e-15 rad, below the
-    /// rounding error of any result.
+    /// Axes of parent and child (0, 1, 2 for x, y, z) to which the axis of a revolute joint is parallel, if there is
+    /// one in both frames. The rotation then has five nonzero entries. The tolerance is 1e-15 rad, below the rounding
+    /// error of any result.
     pub along: Option<(usize, usize)>,
-    /// Nonzero entries of the origin.
+    /// Which coordinates of the origin are nonzero.
     pub shift: Shift,
 }
 
-/// Axes of parent and child along which `axis` is aligned, for a joint with the rotation `placement`.
+/// Axes of parent and child to which `axis` is parallel, for a joint with the rotation `placement`.
 fn axes_along(placement: &Mat3, axis: Vec3) -> Option<(usize, usize)> {
     let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= PARALLEL_TOLERANCE_RAD));
     let child = only(axis)?;

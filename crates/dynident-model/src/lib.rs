@@ -1,8 +1,8 @@
 //! Robot models: spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque terms of
 //! friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's physics.
 //!
-//! Conventions: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's origin, SI units
-//! and radians, joints by name.
+//! Conventions: inertial parameters are in the order [`INERTIAL_NAMES`], inertia is about the body frame's origin,
+//! units are SI units and radians, and joints are identified by name.
 //!
 //! | task | use |
 //! | --- | --- |

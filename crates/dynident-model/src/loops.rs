@@ -1,9 +1,10 @@
-//! Closed chains of the parallelogram kind, as in palletising arms: finds the mimic law of the passive joints.
+//! Closed chains that are parallelograms, as in palletising arms: finds the linear law by which the passive joints
+//! follow the active ones (mimic law).
 //!
 //! A robot description is a tree, so every loop is cut at one point of two links, with `p_1(q) = p_2(q)`. In a
-//! parallelogram the passive joints follow linearly, `q_p = C q_a + c`, with the same `C` in every posture: `C = -J_p⁺
-//! J_a` of the Jacobians of the gap (Khalil and Dombre, *Modeling, Identification and Control of Robots*, 2004, section
-//! 7.3). [`followers`] computes `C` and `c`, and rejects other loops.
+//! parallelogram the passive joints follow linearly, `q_p = C q_a + c`, with the same `C` in every posture. `C =
+//! -J_p⁺ J_a` with the Jacobians of the gap `p_1 - p_2` (Khalil and Dombre, *Modeling, Identification and Control of
+//! Robots*, 2004, section 7.3). [`followers`] computes `C` and `c`, and rejects other loops.
 
 use crate::joint::{Mimic, MimicSource};
 use crate::sample::Random;
@@ -12,14 +13,14 @@ use crate::tree::Model;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
-/// Largest gap of a closed loop relative to its size: lengths in descriptions have at least seven digits.
+/// Largest accepted gap of a closed loop relative to its size: lengths in descriptions have at least seven digits.
 const GAP_TOLERANCE: f64 = 1e-6;
-/// Number of random postures that are tested, and their range about zero, rad (a fifth of it in metres).
+/// Number of random postures that are tested; their range about zero, rad (a fifth of the number in metres).
 const POSTURE_COUNT: usize = 50;
 const POSTURE_RANGE_RAD: f64 = 1.5;
-/// Newton iterations from the description's zero position.
+/// Maximum number of Newton iterations from the description's zero position.
 const NEWTON_STEPS: usize = 30;
-/// Multipliers within this distance of an integer are rounded to it: those of parallelograms are integers.
+/// Multipliers within this distance of an integer are rounded to it: parallelograms have integer multipliers.
 const INTEGER_TOLERANCE: f64 = 1e-7;
 
 /// The cut of a loop: a point of one link that coincides with a point of another.
@@ -29,7 +30,7 @@ pub struct LoopClosure {
     pub links: [String; 2],
     /// The points in the frames of the links, m.
     pub points_m: [[f64; 3]; 2],
-    /// Joints of the tree that have no drive and are moved by the loop.
+    /// Joints of the tree that have no drive and that the loop moves.
     pub passive: Vec<String>,
 }
 
@@ -65,8 +66,8 @@ pub enum LoopError {
     NotLinear { first: String, second: String, gap_m: f64 },
 }
 
-/// Mimic laws of the passive joints, for [`Model::with_followers`]. Existing mimic laws of passive joints are replaced;
-/// those of other joints are kept.
+/// Returns the mimic laws of the passive joints, for [`Model::with_followers`]. They replace existing mimic laws of
+/// passive joints; laws of other joints are kept.
 ///
 /// # Errors
 /// Unknown names, a loop that does not close or is not a parallelogram, or passive joints that the loops do not
@@ -90,7 +91,7 @@ struct Loops<'a> {
 }
 
 struct Law {
-    /// `C`: one row per passive joint, one column per active joint.
+    /// Matrix `C`: one row per passive joint, one column per active joint.
     multipliers: DMatrix<f64>,
     offsets: Vec<f64>,
 }
@@ -113,7 +114,7 @@ impl<'a> Loops<'a> {
         Ok(Self { model, cuts, passive, active })
     }
 
-    /// Positions near the zero of the robot description that close all loops.
+    /// Positions near the zero position of the robot description that close all loops.
     fn closed(&self) -> Result<Vec<f64>, LoopError> {
         let Self { model, cuts, passive, .. } = self;
         let mut q = vec![0.0; model.tree_joints().len()];
@@ -132,7 +133,7 @@ impl<'a> Loops<'a> {
         Ok(q)
     }
 
-    /// `C` and `c` from the Jacobians at positions that close the loops.
+    /// Law `C`, `c` from the Jacobians at positions that close the loops.
     fn law(&self, q: &[f64]) -> Result<Law, LoopError> {
         let Self { model, cuts, passive, active } = self;
         let of_passive = jacobian(model, cuts, q, passive).svd(true, true);
@@ -199,7 +200,8 @@ pub(crate) fn path_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transfor
 
 struct Cut {
     links: [String; 2],
-    /// Both ends: tree joints on the path, and the point in the frame of the last joint's body (or of the base).
+    /// Both ends of the cut: tree joints on the path to it, and the point in the frame of the last joint's body (or
+    /// of the base).
     ends: [(Vec<usize>, Vec3); 2],
     size_m: f64,
 }
@@ -224,7 +226,7 @@ impl Cut {
         Ok(Self { links: closure.links.clone(), ends, size_m })
     }
 
-    /// Position of an end in the base frame, with the pose of every joint on the path.
+    /// Position of an end in the base frame, and the pose of every joint on the path.
     fn end(&self, model: &Model, k: usize, q: &[f64]) -> (Vec3, Vec<(usize, Transform)>) {
         let (path, point) = &self.ends[k];
         let mut placement = Transform::IDENTITY;
@@ -250,7 +252,7 @@ fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
     (gap(widest), widest)
 }
 
-/// Jacobian of the gaps with respect to the joints `by`.
+/// Jacobian of the gaps with respect to the positions of the joints `by`.
 fn jacobian(model: &Model, cuts: &[Cut], q: &[f64], by: &[usize]) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(3 * cuts.len(), by.len());
     for (number, cut) in cuts.iter().enumerate() {

@@ -23,8 +23,8 @@ impl<F: Error> Located<F> {
     }
 }
 
-/// Line and column (1-based, in characters) of byte `offset`. An offset beyond the text or inside a character gives the
-/// last place before it.
+/// Line and column (1-based, in characters) of byte `offset`. For an offset beyond the text or inside a character,
+/// the last position before it.
 pub fn line_and_column(text: &str, offset: usize) -> (u32, u32) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {

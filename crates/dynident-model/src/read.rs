@@ -102,8 +102,8 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     load_robot_with(path.as_ref(), |path| Err(ReadError::Macros { path: path.to_owned() }))
 }
 
-/// As [`load_robot`]; `expand` returns the expanded text of a file with xacro macros, and is called only for such
-/// files.
+/// Like [`load_robot`], but `expand` returns the expanded text of a file with xacro macros; it is called only for
+/// such files.
 ///
 /// # Errors
 /// As [`load_robot`], and those of `expand`.
@@ -210,7 +210,7 @@ fn other_kind(bytes: &[u8], extension: Option<&str>) -> Option<(&'static str, &'
     let text = str::from_utf8(bytes).ok()?;
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     if extension == Some("toml") {
-        // Sections that only a study has.
+        // Section names that only a study has.
         let section = |line: &str| matches!(line, "[robot]" | "[[log]]" | "[format]" | "[design]" | "[iteration]");
         return lines.any(section).then_some((
             "a study",

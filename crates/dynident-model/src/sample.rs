@@ -24,7 +24,7 @@ impl Random {
 
     /// Uniform between `low` and `high`.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        // Steps of 2^-53, so that every value of the grid is exact.
+        // Steps of 2^-53, so that every possible value is exact.
         low + (high - low) * ((self.bits() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0))
     }
 
@@ -81,7 +81,7 @@ fn plain_body(name: String, inertial: Option<InertialParameters>) -> Body {
 /// sometimes several trees on the base; physically consistent bodies; gravity in a general direction.
 ///
 /// # Panics
-/// Never: every part is valid by construction.
+/// It never panics: every part is valid by construction.
 pub fn random_tree(seed: u64, dof: usize) -> Model {
     let mut random = Random::new(seed.wrapping_mul(0x1234_5678_9abc_def1).wrapping_add(7));
     let (mut joints, mut bodies) = (Vec::new(), Vec::new());
@@ -107,11 +107,11 @@ pub fn random_tree(seed: u64, dof: usize) -> Model {
         .expect("a random tree is valid by construction")
 }
 
-/// Planar arm of the paper: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along
-/// -y (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
+/// Planar arm with two revolute joints of parallel axes along z, first link of length `a1_m`, gravity along -y
+/// (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
 ///
 /// # Panics
-/// Never: every part is valid by construction.
+/// It never panics: every part is valid by construction.
 pub fn planar_2r(a1_m: f64, first: InertialParameters, second: InertialParameters) -> Model {
     let z = Vec3([0.0, 0.0, 1.0]);
     let elbow = Transform { rotation: Mat3::IDENTITY, translation: Vec3([a1_m, 0.0, 0.0]) };

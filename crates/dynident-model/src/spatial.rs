@@ -69,7 +69,7 @@ impl Vec3<f64> {
         self.dot(self).sqrt()
     }
 
-    /// The same vector as constants of another scalar.
+    /// The same vector, with constants of another scalar type.
     #[inline(always)]
     pub fn splat<T: Scalar>(self) -> Vec3<T> {
         Vec3([T::splat(self.0[0]), T::splat(self.0[1]), T::splat(self.0[2])])

@@ -1,7 +1,7 @@
-//! The tree in the form with the least operations for the dynamics, prepared once per model.
+//! The robot's tree in a form that needs the fewest operations in the dynamics, prepared once per model.
 //!
-//! Joint torques are independent of the orientation of a body's frame about its joint axis, and of the mass moments of
-//! a revolute body along its axis. Both are used here:
+//! Joint torques do not depend on the orientation of a body's frame about its joint axis, nor on the position of a
+//! revolute body's mass along its axis. Both facts are used here:
 //!
 //! - **Frames.** Every body has an inner frame with the same origin and with z along the joint axis. Its x axis is
 //!   chosen so that a child's axis at a right angle results from a quarter turn about x (modified Denavit-Hartenberg
@@ -17,7 +17,7 @@ use crate::joint::Joint;
 use crate::spatial::{Mat3, Vec3};
 use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 
-/// Constant part of the rotation from a body's inner frame to its parent's.
+/// Constant part of the rotation from a body's inner frame to its parent's inner frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRotation {
     /// Identity: parallel axes.
@@ -28,8 +28,8 @@ pub enum StepRotation {
     General(Mat3),
 }
 
-/// One joint and its body in inner frames. The joint torques are those of the original [`Joint`] and body; the inertial
-/// parameters of the body alone are not.
+/// One joint and its body in inner frames. The joint torques equal those of the original [`Joint`] and body, but the
+/// inertial parameters of single bodies differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointStep {
     /// Index of the parent body, or `None` for the base.
@@ -41,9 +41,9 @@ pub struct JointStep {
     pub offset: f64,
     /// Constant rotation, before the joint's rotation about z. `General` for a prismatic joint.
     pub rotation: StepRotation,
-    /// Origin in the parent's inner frame, m; for a prismatic joint at `q = 0`.
+    /// Origin of the inner frame in the parent's inner frame, m; for a prismatic joint at `q = 0`.
     pub translation: Vec3,
-    /// Nonzero entries of the origin.
+    /// Which coordinates of the origin are nonzero.
     pub shift: Shift,
     /// Axis of a prismatic joint in the parent's inner frame; zero for a revolute joint.
     pub slide: Vec3,
@@ -59,25 +59,25 @@ pub struct JointStep {
     pub is_tip: bool,
     /// True if a body other than the next one is a child of this body, so that its state is needed later.
     pub branches: bool,
-    /// Relation to the parent.
+    /// Relation of the body to its parent.
     pub hang: ParentRelation,
 }
 
 /// Relation of a body to its parent; all false at the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParentRelation {
-    /// True if no sibling has a higher index: in a pass from the tips to the base, this body is the first to contribute
-    /// to the parent.
+    /// True if no sibling has a higher index: in a pass from the tips to the base, this body is the first that
+    /// contributes to the parent.
     pub is_last_child: bool,
-    /// True if the parent is the previous body, so that its state is still at hand.
+    /// True if the parent is the previous body, so that its state is still in registers.
     pub follows: bool,
-    /// True if the parent rotates about an axis that is fixed in the base, so that only moments about that axis matter
-    /// there.
+    /// True if the parent rotates about an axis that is fixed in the base, so that only moments about that axis
+    /// matter for the parent.
     pub on_resting_axis: bool,
 }
 
 pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<JointStep> {
-    // Body from inner frame: first with any x axis, then rotated about z.
+    // Rotation from the inner frame to the body frame: first with any x axis, later rotated about z.
     let plain: Vec<Mat3> = tree.iter().map(|joint| along_z(joint.axis)).collect();
     let relative = |child: usize, parent_frame: &Mat3| {
         parent_frame.transpose().mul_mat(&tree[child].placement.rotation).mul_mat(&plain[child])
@@ -175,7 +175,7 @@ impl StepRotation {
     }
 }
 
-/// `W` as a constant rotation followed by a rotation about z.
+/// Decomposes `W` into a constant rotation followed by a rotation about z.
 fn constant_rotation(w: &Mat3) -> (StepRotation, f64) {
     let m = &w.0;
     let slant = m[0][2].hypot(m[1][2]);

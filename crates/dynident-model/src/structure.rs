@@ -2,27 +2,27 @@
 
 use crate::spatial::Vec3;
 
-/// Tolerance of parallel and perpendicular axes, rad: rounding error of rotations by multiples of 90° written as roll,
+/// Tolerance for parallel and perpendicular axes, rad: the rounding error of rotations by multiples of 90° in roll,
 /// pitch and yaw. It changes results by less than their own rounding error.
 pub(crate) const PARALLEL_TOLERANCE_RAD: f64 = 1e-15;
 
-/// Nonzero entries of an origin in the parent's frame; products with zeros are skipped.
+/// Which coordinates of an origin in the parent's frame are nonzero; products with zeros are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shift {
-    /// At the parent's origin.
+    /// Origin at the parent's origin.
     None,
-    /// On the x axis.
+    /// Origin on the parent's x axis.
     X,
-    /// On the y axis.
+    /// Origin on the parent's y axis.
     Y,
-    /// On the z axis.
+    /// Origin on the parent's z axis.
     Z,
-    /// General, or moving with the joint.
+    /// Origin anywhere, or moving with the joint.
     Any,
 }
 
 impl Shift {
-    /// Shift of an origin that does not move.
+    /// Class of an origin that does not move.
     pub(crate) fn of(Vec3([x, y, z]): Vec3) -> Self {
         match (x != 0.0, y != 0.0, z != 0.0) {
             (false, false, false) => Self::None,

@@ -9,7 +9,7 @@ use crate::joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
 use crate::steps::{JointStep, steps};
 
-/// Standard gravity of the tools of this field (Pinocchio, MuJoCo, URDF simulators), m/s², along -z of the base.
+/// Standard gravity, m/s², along -z of the base, as in Pinocchio, MuJoCo and URDF simulators.
 pub const STANDARD_GRAVITY: Vec3 = Vec3([0.0, 0.0, -9.81]);
 
 /// A link of the description that belongs to a body: the body's own link, or one fixed to it.
@@ -28,7 +28,7 @@ pub struct Link {
 /// A rigid body: all links that move together with one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// Links of the body; the first is the joint's child link, at the identity.
+    /// Links of the body; the first one is the joint's child link, whose frame is the body frame.
     pub links: Vec<Link>,
 }
 
@@ -38,7 +38,8 @@ impl Body {
         &self.links[0].name
     }
 
-    /// Prior inertial parameters in the body frame: sum over the links with known inertial; `None` if no link has one.
+    /// Prior inertial parameters in the body frame: the sum over the links with known inertial; `None` if no link has
+    /// one.
     pub fn prior(&self) -> Option<InertialParameters> {
         self.links
             .iter()
@@ -59,7 +60,7 @@ pub struct Model {
     name: String,
     gravity: Vec3,
     tree: Vec<Joint>,
-    /// Degrees of freedom: `tree` without mimic joints.
+    /// Degrees of freedom: joints of `tree` that are not mimic joints.
     joints: Vec<Joint>,
     coupling: Option<JointCoupling>,
     bodies: Vec<Body>,
@@ -77,7 +78,7 @@ struct OtherConvention {
 }
 
 impl Model {
-    /// Builds a model from the joints of its tree and their bodies. `base` contains the fixed links.
+    /// Builds a model from the joints of its tree and their bodies. `base` contains the links that do not move.
     ///
     /// # Errors
     /// Different counts, a repeated name, a parent after its child, an axis that is not a unit vector, a cycle of mimic
@@ -93,7 +94,7 @@ impl Model {
             if joint.parent.is_some_and(|parent| parent >= index) {
                 return Err(ModelError::ParentAfterChild { joint: joint.name.clone() });
             }
-            // Tolerance well above the rounding error of a normalised vector.
+            // The tolerance is well above the rounding error of a normalised vector.
             if (joint.axis.norm() - 1.0).abs().is_nan() || (joint.axis.norm() - 1.0).abs() > 1e-9 {
                 return Err(ModelError::AxisNotUnit { joint: joint.name.clone() });
             }
@@ -132,7 +133,7 @@ impl Model {
         &self.name
     }
 
-    /// Degrees of freedom: length of every joint vector.
+    /// Number of degrees of freedom: the length of every joint vector.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
@@ -142,8 +143,8 @@ impl Model {
         &self.joints
     }
 
-    /// All joints of the tree, parents first: joint `i` moves body `i`. The same as [`joints`](Model::joints) without
-    /// mimic joints.
+    /// All joints of the tree, parents first: joint `i` moves body `i`. Equal to [`joints`](Model::joints) if there
+    /// are no mimic joints.
     pub fn tree_joints(&self) -> &[Joint] {
         &self.tree
     }
@@ -153,12 +154,13 @@ impl Model {
         self.coupling.as_ref()
     }
 
-    /// Tree index of a degree of freedom, and of its body.
+    /// Index in the tree of the joint of a degree of freedom, and of its body.
     pub fn body_of(&self, joint: usize) -> usize {
         self.coupling.as_ref().map_or(joint, |coupling| coupling.driving()[joint])
     }
 
-    /// Degrees of freedom that move a joint of the tree, with the velocity ratios: its row of `G`.
+    /// Degrees of freedom that move a joint of the tree, with the velocity ratios: the joint's row of `G` in
+    /// [`JointCoupling`].
     pub fn drivers(&self, tree_joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let itself = self.coupling.is_none().then_some((tree_joint, 1.0));
         let followed = self.coupling.iter().flat_map(move |coupling| coupling.row(tree_joint).iter().copied());
@@ -188,12 +190,13 @@ impl Model {
         10 * self.body_count()
     }
 
-    /// Precomputed numbers of the joints; same order as [`tree_joints`](Model::tree_joints).
+    /// Precomputed numbers of the joints, in the order of [`tree_joints`](Model::tree_joints).
     pub fn maps(&self) -> &[JointMap] {
         &self.maps
     }
 
-    /// Joints and bodies in the form with the least operations; same order as [`tree_joints`](Model::tree_joints).
+    /// Joints and bodies in a form that needs the fewest operations, in the order of
+    /// [`tree_joints`](Model::tree_joints).
     pub fn steps(&self) -> &[JointStep] {
         &self.steps
     }
@@ -203,7 +206,7 @@ impl Model {
         &self.bodies
     }
 
-    /// The fixed body.
+    /// The base, which does not move.
     pub fn base(&self) -> &Body {
         &self.base
     }
@@ -213,8 +216,8 @@ impl Model {
         self.gravity
     }
 
-    /// Inertial parameters of the bodies in their frames, as used by the dynamics; zero where [`Body::prior`] is
-    /// unknown.
+    /// Inertial parameters of the bodies in their frames, as used by the dynamics; zero for bodies whose
+    /// [`Body::prior`] is unknown.
     pub fn inertials(&self) -> &[InertialParameters] {
         &self.inertials
     }
@@ -271,8 +274,9 @@ impl Model {
         Ok(self)
     }
 
-    /// The model of a Denavit-Hartenberg table read in the convention that it does not state, and that convention;
-    /// `None` for other descriptions. Gravity and locked joints are kept; any other change of the model removes it.
+    /// For a Denavit-Hartenberg table: the model read in the other convention (standard instead of modified, or the
+    /// reverse), and that convention. `None` for other descriptions. Gravity and locked joints are kept; any other
+    /// change of the model removes it.
     pub fn other_convention(&self) -> Option<(DhConvention, &Self)> {
         self.other_convention.as_ref().map(|other| (other.convention, &other.model))
     }
@@ -282,9 +286,10 @@ impl Model {
         self
     }
 
-    /// The same robot with the distance of these tree joints (indices as in [`tree_joints`](Model::tree_joints)) from
-    /// the previous joint multiplied by `factor`: `p → factor p` of the placement's translation, m. Links become
-    /// longer, shorter, or mirrored. Bodies keep their parameters in their frames.
+    /// The same robot with longer or shorter links: the distances of these tree joints (indices as in
+    /// [`tree_joints`](Model::tree_joints)) from the previous joint are multiplied by `factor`, which scales the
+    /// translation of the placement, m. A negative factor mirrors the link. Bodies keep their parameters in their
+    /// frames.
     ///
     /// # Errors
     /// If a joint is not there or a number would not be finite.
@@ -362,7 +367,7 @@ impl Model {
         if links.is_empty() {
             return Ok(self.clone());
         }
-        // The base keeps its first link, the root of all others.
+        // The base keeps its first link, to which all other links are connected.
         let all = || self.bodies.iter().flat_map(|body| &body.links).chain(self.base.links.iter().skip(1));
         if let Some(link) = links.iter().find(|name| all().all(|link| link.name != **name)) {
             let known = all().map(|link| link.name.clone()).collect();
@@ -406,7 +411,7 @@ impl Model {
         self
     }
 
-    /// The same robot with other mimic laws: `followers` names joints of the tree.
+    /// The same robot with other mimic laws; `followers` names joints of the tree.
     ///
     /// # Errors
     /// An unknown name, a cycle of mimic joints, or a number that is not finite.
@@ -479,8 +484,8 @@ impl Model {
         })
     }
 
-    /// Joints of the tree after locking those with a position: locked sources become an offset, and a mimic joint
-    /// without a free source is locked as well.
+    /// Joints of the tree after locking those with a given position. A locked source becomes an offset of the mimic
+    /// joints that follow it; a mimic joint without a free source is locked, too.
     fn following_the_rest(&self, position_of: &mut [Option<f64>]) -> Vec<Joint> {
         let mut tree = self.tree.clone();
         let Some(coupling) = &self.coupling else { return tree };

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Maximum number of characters of a label; the tooltip has the full label.
 const MAX_LABEL_CHARS: usize = 38;
-/// Maximum number of bars in the text for screen readers.
+/// Maximum number of bars in the description for screen readers.
 const MAX_SPOKEN_BARS: usize = 12;
 /// Width of the plot, the labels and the figures, and height of a row, px.
 const WIDTH: f64 = 800.0;
@@ -26,11 +26,11 @@ const TICK_WIDTH: f64 = 60.0;
 pub struct Bar {
     /// Label.
     pub label: String,
-    /// Value; a value that is not finite gives no bar.
+    /// Value; without a bar if it is not finite.
     pub value: f64,
     /// Half-width of the error bar.
     pub half_width: Option<f64>,
-    /// Reference value (a prior, a true value), drawn as a mark.
+    /// Reference value (for example a prior or the true value), drawn as a mark.
     pub reference: Option<f64>,
 }
 
@@ -43,7 +43,7 @@ pub struct BarPlot {
     pub note: String,
     /// Label of the axis, with its unit.
     pub label: String,
-    /// Meaning of the marks; may be empty.
+    /// Legend of the reference marks; may be empty.
     pub reference_label: String,
     /// The bars, from top to bottom.
     pub bars: Vec<Bar>,
@@ -68,7 +68,7 @@ impl BarPlot {
         self
     }
 
-    /// Sets the meaning of the marks.
+    /// Sets the legend of the reference marks.
     #[must_use]
     pub fn reference_label(mut self, label: impl Into<String>) -> Self {
         self.reference_label = label.into();
@@ -123,7 +123,7 @@ impl BarPlot {
         26.0 + ROW_HEIGHT * self.bars.len() as f64 + 8.0
     }
 
-    /// Renders the plot with the widths of all, the labels and the figures, px.
+    /// Renders the plot with the widths of the whole plot, the labels and the values, px.
     fn picture(
         &self,
         [width, labels, figures]: [f64; 3],

@@ -1,10 +1,10 @@
-//! Convergence of figures over runs.
+//! Convergence of quantities over runs.
 
 use crate::curve_picture::{Curve, CurvePicture};
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, check_length, embedded, rounded};
 
-/// Figures by run (or iteration), with optional error bars.
+/// Quantities by run (or iteration), with optional error bars.
 ///
 /// ```
 /// use dynident_report::ConvergencePlot;

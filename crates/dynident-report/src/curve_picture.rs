@@ -24,7 +24,7 @@ const STRIP_GAP: f64 = 26.0;
 
 pub(crate) struct Curve<'a> {
     pub(crate) name: &'a str,
-    /// One value per entry of the axis; NaN gives a gap.
+    /// One value per entry of the axis; NaN makes a gap.
     pub(crate) values: Vec<f64>,
     pub(crate) dashed: bool,
     /// Points without a line.
@@ -35,8 +35,8 @@ pub(crate) struct Curve<'a> {
     pub(crate) bars: Option<[Vec<f64>; 2]>,
 }
 
-/// Curves over a common axis, and optionally a strip with the difference of two curves. Values on a logarithmic axis
-/// are exponents.
+/// Curves over a common axis, and optionally a strip with the difference of two curves. On a logarithmic axis the
+/// stored values are exponents of ten.
 pub(crate) struct CurvePicture<'a> {
     pub(crate) title: &'a str,
     pub(crate) x_label: &'a str,
@@ -44,11 +44,11 @@ pub(crate) struct CurvePicture<'a> {
     pub(crate) x: &'a [f64],
     pub(crate) curves: Vec<Curve<'a>>,
     pub(crate) log_y: bool,
-    /// Name of the difference, and indices of minuend and subtrahend.
+    /// Name of the difference, and indices of the two curves: the second is subtracted from the first.
     pub(crate) difference: Option<(&'a str, [usize; 2])>,
     /// Shaded intervals of the x axis.
     pub(crate) shaded: &'a [[f64; 2]],
-    /// Integers on the x axis, with a margin on both sides.
+    /// Whether the x axis has integers only, with a margin on both sides.
     pub(crate) counts: bool,
 }
 
@@ -142,7 +142,7 @@ fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>,
 }
 
 impl CurvePicture<'_> {
-    /// Text for screen readers: ranges of axis and curves, rms of the difference.
+    /// Description for screen readers: ranges of axis and curves, RMS of the difference.
     pub(crate) fn in_words(&self) -> String {
         let range = |values: &[f64]| {
             let finite = values.iter().copied().filter(|value| value.is_finite());

@@ -1,4 +1,4 @@
-//! Diagrams of boxes, arrows and words.
+//! Diagrams of boxes, arrows and texts.
 
 use crate::curve_picture::Place;
 use crate::error::ReportError;
@@ -116,7 +116,8 @@ impl Diagram {
     fn framed(mut self, at: [f64; 2], size: [f64; 2], lines: &[&str], decision: bool) -> Self {
         let [width, height] = size;
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) as f64;
-        // At the height of its text a diamond is only partly usable.
+        // The text of a diamond needs more width than that of a box, because a diamond is narrower above and below
+        // its centre.
         let room = if decision { 1.7 } else { 1.0 };
         let size =
             [width.max(room * CHAR_WIDTH * longest + 12.0), height.max(room * LINE_HEIGHT * lines.len() as f64 + 8.0)];

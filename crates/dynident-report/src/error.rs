@@ -70,16 +70,16 @@ pub enum ReportError {
         /// The characters.
         characters: String,
     },
-    /// The program was compiled without this form of figures. Write SVG, or use the released program.
+    /// The program was compiled without this file format of figures. Write SVG, or use the released program.
     #[error("this build of Dynident writes no {form}: write .svg and convert it, or use the program of the releases")]
     NotBuilt {
-        /// The form.
+        /// File format.
         form: &'static str,
     },
     /// A bug in Dynident: the figure cannot be converted. Report the message, and write SVG meanwhile.
     #[error("cannot write the {form} of a figure: {message}")]
     Conversion {
-        /// The form.
+        /// File format.
         form: &'static str,
         /// The problem.
         message: String,

@@ -1,4 +1,4 @@
-//! Fitness of a search by generation.
+//! Fitness of an optimiser's individuals by generation.
 
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};

@@ -16,11 +16,11 @@ const POSITIVE_COLOUR: &str = "#d55e00";
 /// Width of the colour scale, px, and number of steps on each side.
 const SCALE_WIDTH: f64 = 240.0;
 const SCALE_STEPS: usize = 10;
-/// Maximum number of entries in the text for screen readers.
+/// Maximum number of entries in the description for screen readers.
 const MAX_SPOKEN_ENTRIES: usize = 5;
 
-/// A matrix in colours with a scale: blue for negative and red for positive values, with a strength relative to the
-/// largest value. Gaps and the upper half of a symmetric matrix are empty. Tooltips show the values.
+/// A matrix in colours with a colour scale: blue for negative and red for positive values, stronger for larger
+/// magnitudes. Missing values and the upper half of a symmetric matrix are empty. Tooltips show the values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Title.
@@ -77,7 +77,7 @@ impl HeatMap {
         self.rows == self.columns && (0..self.rows.len()).all(|row| (0..row).all(|column| same(row, column)))
     }
 
-    /// Text for screen readers: the largest entries, without the upper half of a symmetric matrix.
+    /// Description for screen readers: the largest entries, without the upper half of a symmetric matrix.
     fn in_words(&self) -> String {
         let entries = self
             .values
@@ -111,7 +111,7 @@ impl HeatMap {
             .map(|k| format!("M{} {labels}V{}", tenth(labels + side * k as f64), tenth(bottom)));
         let rows =
             (0..=self.rows.len()).map(|k| format!("M{labels} {}H{}", tenth(labels + side * k as f64), tenth(right)));
-        // The scale from the negative to the positive limit.
+        // The colour scale from the negative to the positive limit.
         let step_width = SCALE_WIDTH / (2 * SCALE_STEPS + 1) as f64;
         let scale = (0..=2 * SCALE_STEPS).map(|k| {
             let value = k as f64 / SCALE_STEPS as f64 - 1.0;
@@ -126,7 +126,7 @@ impl HeatMap {
             let x = labels + 0.5 * step_width + (SCALE_WIDTH - step_width) * 0.5 * (share + 1.0);
             (tenth(x), short(share * limit, 3))
         });
-        // Overlapping names are skipped; the tooltips have them.
+        // Names that would overlap are skipped; the tooltips contain them.
         let every = (11.0 / side).ceil().max(1.0) as usize;
         let names = |names: &[String]| -> Vec<(f64, String)> {
             let shown = names.iter().enumerate().step_by(every);

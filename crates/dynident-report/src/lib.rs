@@ -1,10 +1,10 @@
 //! **Report pages**: results as one self-contained HTML page, without network access or other files.
 //!
 //! A [`Report`] is a list of typed sections, each a plain struct with a template. Line plots are interactive
-//! ([uPlot](https://github.com/leeoniya/uPlot), embedded): values at the cursor, zoom by dragging, curves switched in
-//! the legend. Bars and heat maps are pictures with tooltips. Without scripts and in print, every plot is a static
-//! picture. Pages support light and dark themes, narrow screens, keyboard and screen readers. All content is escaped:
-//! names of joints or files never become markup or script.
+//! ([uPlot](https://github.com/leeoniya/uPlot), embedded): they show the values at the cursor, zoom by dragging, and
+//! show or hide curves by their legend. Bars and heat maps are pictures with tooltips. Without scripts and in print,
+//! every plot is a static picture. Pages support light and dark themes, narrow screens, keyboard and screen readers.
+//! All content is escaped: names of joints or files never become markup or script.
 //!
 //! ```
 //! use dynident_report::{KeyFigures, LinePlot, Report, Table};

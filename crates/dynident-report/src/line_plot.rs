@@ -12,7 +12,7 @@ const PIXEL_COLUMNS: usize = 1200;
 pub struct Line {
     /// Name in the legend.
     pub name: String,
-    /// One value per entry of the axis; NaN gives a gap.
+    /// One value per entry of the axis; NaN makes a gap.
     pub values: Vec<f64>,
     /// Drawn dashed.
     pub dashed: bool,
@@ -22,7 +22,8 @@ pub struct Line {
     pub broad: bool,
 }
 
-/// Curves over a common axis: zoom by dragging, values at the cursor, curves switched in the legend.
+/// Curves over a common axis. The plot shows the values at the cursor, zooms by dragging, and shows or hides curves
+/// by their legend.
 ///
 /// For more than 4800 samples the page contains the minimum and maximum of each of 1200 pixel columns
 /// ([`kept_samples`](crate::kept_samples)): the plot looks the same, but zooming adds no detail.
@@ -42,9 +43,11 @@ pub struct LinePlot {
     pub lines: Vec<Line>,
     /// Logarithmic y axis; values that are not positive give gaps.
     pub log_y: bool,
-    /// Strip with the difference of two curves on a separate scale: name, and indices of minuend and subtrahend.
+    /// Strip with the difference of two curves on a separate scale: its name, and the indices of the two curves, of
+    /// which the second is subtracted from the first.
     pub difference: Option<(String, [usize; 2])>,
-    /// Joint of the plot; choosing another joint in the picture of the robot hides it. Empty for none.
+    /// Joint that the plot belongs to; the plot is hidden if another joint is chosen in the picture of the robot.
+    /// Empty if it belongs to no joint.
     pub joint: String,
     /// Shaded intervals of the x axis.
     pub shaded: Vec<[f64; 2]>,
@@ -67,7 +70,7 @@ impl LinePlot {
         }
     }
 
-    /// Sets the joint of the plot.
+    /// Sets the joint that the plot belongs to.
     #[must_use]
     pub fn of_joint(mut self, joint: impl Into<String>) -> Self {
         self.joint = joint.into();

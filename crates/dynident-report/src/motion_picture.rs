@@ -20,7 +20,7 @@ const MAX_POINTS: usize = 600;
 /// One quantity of one joint over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionCurve<'a> {
-    /// One value per time; NaN gives a gap.
+    /// One value per time; NaN makes a gap.
     pub values: &'a [f64],
     /// Lower and upper limit, if any.
     pub limits: Option<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! Assembly of sections to a page.
+//! Combines sections to a page.
 
 use crate::bar_plot::BarPlot;
 use crate::convergence_plot::ConvergencePlot;
@@ -29,13 +29,13 @@ pub enum Section {
     Table(Table),
     /// Curves.
     LinePlot(LinePlot),
-    /// Figures by run.
+    /// Quantities by run.
     ConvergencePlot(ConvergencePlot),
     /// Bars.
     BarPlot(BarPlot),
     /// A matrix in colours.
     HeatMap(HeatMap),
-    /// Boxes, arrows and words.
+    /// Boxes, arrows and texts.
     Diagram(Diagram),
     /// A robot in three dimensions.
     Scene(Scene),

@@ -1,4 +1,4 @@
-//! Colours of the robot in three dimensions.
+//! Colours of the bodies in the view of the robot in three dimensions.
 
 /// The page's palette in light colours; the last is the grey of bodies without a class.
 pub(crate) const PALETTE: [[f64; 3]; 8] = [

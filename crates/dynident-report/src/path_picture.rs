@@ -165,7 +165,7 @@ impl View<'_> {
         }
     }
 
-    /// Upper edge and height of the floor, px; `None` from above.
+    /// Upper edge and height of the floor in the view from the side, px; `None` from above.
     fn floor(&self, picture: &PathPicture<'_>) -> Option<[f64; 2]> {
         let height = picture.floor_m.filter(|_| self.axes[1] == 2)?;
         let y = self.y(height);

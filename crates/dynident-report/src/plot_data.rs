@@ -15,7 +15,7 @@ pub(crate) struct PlotData<'a> {
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) log: bool,
-    /// Integers on the x axis.
+    /// Whether the x axis has integers only.
     pub(crate) counts: bool,
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct StripData<'a> {
     pub(crate) of: [usize; 2],
 }
 
-/// JSON for a script element: without `<`, which could end it, and without `>` and `&`.
+/// JSON for a script element, without `<`, which could end the element, and without `>` and `&`.
 pub(crate) fn embedded(data: &impl Serialize) -> Result<String, ReportError> {
     let json = dynident_text::json::to_string(data)?;
     Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))

@@ -46,7 +46,7 @@ impl Default for PrintStyle {
 pub enum PrintPanel {
     /// Curves over a common axis.
     Lines(LinePlot),
-    /// Figures by run.
+    /// Quantities by run.
     Runs(ConvergencePlot),
     /// Bars.
     Bars(BarPlot),
@@ -64,7 +64,7 @@ pub enum PrintPanel {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintFigure {
-    /// Title for screen readers; it is not drawn, because a paper has a caption.
+    /// Title for screen readers; it is not drawn, because a publication has a caption.
     pub title: String,
     /// The plots.
     pub panels: Vec<PrintPanel>,
@@ -111,7 +111,7 @@ impl PrintFigure {
     }
 }
 
-/// Range of the width of a figure in pixels of 12 px text: at least room for one plot, at most a poster.
+/// Minimum and maximum width of a figure in pixels with text of 12 px: room for one plot, and the size of a poster.
 const MIN_WIDTH: f64 = 200.0;
 const MAX_WIDTH: f64 = 20_000.0;
 

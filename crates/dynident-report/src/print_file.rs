@@ -29,7 +29,7 @@ fn pdf(_: &str) -> Result<Vec<u8>, ReportError> {
 
 #[cfg(feature = "pdf")]
 fn pdf(svg: &str) -> Result<Vec<u8>, ReportError> {
-    /// A point of PDF.
+    /// Typographic points per inch, the unit of PDF.
     const POINTS_PER_INCH: f32 = 72.0;
     let tree = conversion::parsed(svg, "PDF", POINTS_PER_INCH)?;
     svg2pdf::to_pdf(&tree, svg2pdf::ConversionOptions::default(), svg2pdf::PageOptions { dpi: POINTS_PER_INCH })
@@ -56,7 +56,7 @@ fn png(svg: &str, dpi: f64) -> Result<Vec<u8>, ReportError> {
     let [width, height] = [tree.size().width(), tree.size().height()].map(|length| f64::from(length).round().max(1.0));
     let pixels = if width * height > MAX_PIXELS { None } else { Pixmap::new(width as u32, height as u32) };
     let mut pixels = pixels.ok_or(ReportError::Pixels { width_px: width, height_px: height })?;
-    // The ground of the figure covers the pixels at the edge in part.
+    // The background of the figure covers the pixels at the edge only in part.
     pixels.fill(Color::WHITE);
     resvg::render(&tree, Transform::identity(), &mut pixels.as_mut());
     // All pixels are opaque: the alpha channel is left out.

@@ -6,16 +6,16 @@ use crate::plot_data::{check_length, embedded};
 use crate::surface::Surface;
 use serde::Serialize;
 
-/// Motion of a body relative to its parent.
+/// How a body moves relative to its parent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BodyMotion {
-    /// Fixed.
+    /// The body is fixed to its parent.
     #[default]
     Fixed,
-    /// Turns about an axis; position in rad.
+    /// The body turns about an axis; its position is in rad.
     Turns,
-    /// Slides along an axis; position in m.
+    /// The body slides along an axis; its position is in m.
     Slides,
 }
 
@@ -27,7 +27,7 @@ pub struct SceneBody {
     pub name: String,
     /// Index of the parent, below the body's own index; `None` for a body that is fixed to the world.
     pub parent: Option<usize>,
-    /// `parent_from_body` at position zero, rows.
+    /// Rotation from the body's frame to the parent's frame at position zero, by rows.
     pub rotation: [[f64; 3]; 3],
     /// Origin at position zero in the parent's frame, m.
     pub translation_m: [f64; 3],
@@ -35,13 +35,13 @@ pub struct SceneBody {
     pub motion: BodyMotion,
     /// Unit vector of the axis.
     pub axis: [f64; 3],
-    /// Joints of [`Scene::joints`] that move it, with factors: `position = Σ factor · q[joint] + offset`.
+    /// Joints of [`Scene::joints`] that move the body, with factors: `position = Σ factor · q[joint] + offset`.
     pub drivers: Vec<(usize, f64)>,
-    /// Position while all joints are at zero, rad or m.
+    /// Position of the body relative to its parent if all joints are at zero, rad or m.
     pub offset: f64,
     /// Surface in the body's frame.
     pub surface: Surface,
-    /// Inertia as a solid of uniform density, one or several to compare.
+    /// Ellipsoids of uniform density with the inertia of the body; several to compare sets of values.
     pub ellipsoids: Vec<Ellipsoid>,
     /// Pose at [`Scene::posture`] in the world frame, for the still picture: rotation (rows), origin in m.
     pub pose: ([[f64; 3]; 3], [f64; 3]),
@@ -55,11 +55,11 @@ pub struct Ellipsoid {
     pub centre: [f64; 3],
     /// Map of the unit sphere, rows, m.
     pub shape: [[f64; 3]; 3],
-    /// Whether it belongs to the earlier set of values.
+    /// Whether it belongs to the earlier of the two compared sets of values.
     pub earlier: bool,
 }
 
-/// Colours of the bodies by class.
+/// A colouring: the class of each body, shown by its colour.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Colouring {
     /// Name of the quantity that the colours show.
@@ -68,14 +68,14 @@ pub struct Colouring {
     pub classes: Vec<(String, usize)>,
     /// Class of each body; `None` is drawn grey.
     pub of: Vec<Option<usize>>,
-    /// Text of each body, shown in its list.
+    /// Text of each body, shown in the list of bodies.
     pub words: Vec<String>,
-    /// Index of a gauge of the played motion that colours the bodies instead, between the first two classes by its
-    /// value relative to its limits.
+    /// Index of a gauge of the played motion; if given, the colour of a body is between those of the first two
+    /// classes, by the value relative to its limits.
     pub gauge: Option<usize>,
 }
 
-/// A quantity of each joint along a motion.
+/// A quantity of each joint during a motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gauge {
     /// Name with unit.
@@ -95,22 +95,22 @@ pub struct SceneMotion {
     pub times_s: Vec<f64>,
     /// Positions by joint and sample, rad or m.
     pub q: Vec<Vec<f64>>,
-    /// Positions by joint and sample of a second, pale arm: the desired motion; may be empty.
+    /// Positions by joint and sample of a second, pale arm, which shows the desired motion; may be empty.
     pub ghost: Vec<Vec<f64>>,
     /// Quantities of the joints.
     pub gauges: Vec<Gauge>,
-    /// Distances of bodies.
+    /// Distances between bodies.
     pub pairs: Vec<BodyPair>,
 }
 
-/// Distance of two bodies along a motion. The picture marks their nearest points while they are near.
+/// Distance between two bodies during a motion. The view marks their nearest points while they are near.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyPair {
-    /// Names of both.
+    /// Names of both bodies.
     pub name: String,
-    /// Minimum distance, m.
+    /// Required minimum distance, m.
     pub clearance_m: f64,
-    /// Distance below which they are near, m.
+    /// Distance below which the bodies are near, m.
     pub near_m: f64,
     /// Distance at each sample, m.
     pub distance_m: Vec<f64>,
@@ -118,8 +118,8 @@ pub struct BodyPair {
     pub points_m: Vec<[[f64; 3]; 2]>,
 }
 
-/// A robot in three dimensions: turn, zoom, colours by what is known of each body, motions to play. Without scripts or
-/// WebGL, and in print, it is a still picture.
+/// A robot in three dimensions, which can be turned and zoomed. Colours show what is known of each body, and motions
+/// can be played. Without scripts or WebGL, and in print, it is a still picture.
 ///
 /// ```
 /// use dynident_report::{BodyMotion, Report, Scene, SceneBody, Surface};
@@ -160,16 +160,16 @@ pub struct Scene {
     pub motions: Vec<SceneMotion>,
     /// Height of the floor, m.
     pub floor_m: Option<f64>,
-    /// Column: x and y of its axis, and radius, m.
+    /// Vertical column: x and y of its axis, and its radius, m.
     pub column_m: Option<[f64; 3]>,
     /// Boxes as ranges of x, y and z, m; an open side is `None`.
     pub boxes_m: Vec<[[Option<f64>; 2]; 3]>,
 }
 
-/// Triangles of all bodies together.
+/// Maximum number of triangles of all bodies together.
 const MAX_TRIANGLES: usize = 40_000;
 
-/// Steps of a coordinate of a vertex over the extent of its body.
+/// Number of steps into which the extent of a body is divided for the coordinates of its vertices.
 const VERTEX_STEPS: f64 = 8191.0;
 
 #[derive(Serialize)]
@@ -196,7 +196,7 @@ struct BodyData<'a> {
     axis: [f64; 3],
     drivers: &'a [(usize, f64)],
     offset: f64,
-    /// Vertices as steps from `low`, in one list.
+    /// Coordinates of the vertices as steps from `low`, in one list.
     low: [f64; 3],
     step: f64,
     vertices: Vec<u32>,
@@ -229,7 +229,7 @@ struct PairData<'a> {
     clearance: f64,
     near: f64,
     distance: Vec<Option<f64>>,
-    /// Coordinates of both points by sample; null while the bodies are not near.
+    /// Coordinates of the nearest points of both bodies by sample; null while the bodies are not near.
     points: Vec<Vec<Option<f64>>>,
 }
 

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-/// Sides of round surfaces.
+/// Number of sides that approximate a round surface.
 const SIDES: usize = 24;
 
-/// Steps from the equator of a sphere to its pole.
+/// Number of steps from the equator of a sphere to its pole.
 const STEPS: usize = 6;
 
-/// Corners of the sides of a box.
+/// Indices of the corners of each side of a box.
 const FACES: [[u32; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
-/// A surface of triangles, m.
+/// A surface of triangles; lengths in m.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Vertices, m.
@@ -75,7 +75,7 @@ impl Surface {
                 surface.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
             }
         }
-        // Triangles at a pole have no area.
+        // Triangles at a pole of the surface have no area, so they are removed.
         surface.merged(|vertex| vertex.map(|x| (x * 1e9).round() as i64))
     }
 
@@ -95,13 +95,13 @@ impl Surface {
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
     }
 
-    /// Volume of the enclosed space with the sign of the orientation, m³.
+    /// Volume of the enclosed space, m³; negative if the triangles are oriented inwards.
     pub fn volume_m3(&self) -> f64 {
         self.triangles.iter().map(|corners| self.corners(*corners)).map(|[a, b, c]| dot(a, cross(b, c)) / 6.0).sum()
     }
 
-    /// A surface with at most `triangles` triangles: all vertices in a cell of a grid become their mean (Rossignac and
-    /// Borrel 1993). The cells are as small as the number of triangles allows, within a factor of 1.1.
+    /// The surface with at most `triangles` triangles: all vertices in a cell of a grid become their mean (Rossignac
+    /// and Borrel 1993). The cells are as small as this number of triangles allows, within a factor of 1.1.
     #[must_use]
     pub fn within(&self, triangles: usize) -> Self {
         let [low, high] = self.bounds_m();

@@ -44,7 +44,7 @@ impl Table {
         Ok(text)
     }
 
-    /// Title and note, a line each that starts with `mark` and ends with `end`.
+    /// Title and note, one line each, which starts with `mark` and ends with `end`.
     fn remark(&self, mark: &str, end: &str) -> String {
         let lines = [&self.title, &self.note].into_iter().filter(|line| !line.is_empty());
         let shown =

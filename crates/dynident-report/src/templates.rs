@@ -43,7 +43,7 @@ fn prose(text: &str) -> Value {
     Value::from_safe_string(parts.iter().enumerate().map(part).collect())
 }
 
-/// Whether a file is rendered; scripts and styles are included as they are.
+/// Whether a file is a template that has to be rendered; scripts and styles are included as they are.
 fn is_template(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|kind| kind == "html" || kind == "svg")
 }

@@ -14,7 +14,7 @@ pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     if last - first > 1000.0 || (last - first).is_nan() {
         return Vec::new();
     }
-    // Multiplying the step avoids accumulated rounding errors.
+    // Multiplying the step, instead of adding it repeatedly, avoids accumulated rounding errors.
     (0..=(last - first).max(0.0) as usize).map(|k| (first + k as f64) * step).collect()
 }
 

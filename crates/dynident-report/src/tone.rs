@@ -1,4 +1,4 @@
-//! Rating of a value.
+//! Rating of a value as good or bad.
 
 use serde::Serialize;
 

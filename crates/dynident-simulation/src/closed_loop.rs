@@ -12,7 +12,7 @@ use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
-/// Velocity above which a run has diverged, rad/s (m/s) of a usual arm; no robot reaches it.
+/// Velocity above which a run has diverged, rad/s (m/s) for an arm of usual size; no robot reaches it.
 const DIVERGENCE_SPEED: f64 = 1e4;
 
 /// Initial state of a run.
@@ -23,7 +23,7 @@ pub enum Start {
     /// Position and velocity of the reference.
     #[default]
     Reference,
-    /// Position of the reference, at rest.
+    /// Position of the reference, with zero velocity.
     AtRest,
     /// A given state.
     At {
@@ -34,7 +34,7 @@ pub enum Start {
     },
 }
 
-/// Limits that stop a run, and limits of its torques. None by default.
+/// Limits that stop a run, and torque limits of the controller. Default no limits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -57,8 +57,8 @@ pub struct RunLimits {
 }
 
 impl RunLimits {
-    /// Position, velocity and torque limits of the robot description; missing ones are the largest finite number,
-    /// because JSON has no infinity.
+    /// Position, velocity and torque limits of the robot description. A missing limit becomes the largest finite
+    /// number, because JSON cannot represent infinity.
     pub fn of_model(model: &Model) -> Self {
         let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
             Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
@@ -106,7 +106,7 @@ impl RunLimits {
 pub struct LoopSettings {
     /// Integrator of the robot. Default one semi-implicit Euler step per sample.
     pub integrator: Integrator,
-    /// Initial state. Default on the reference.
+    /// Initial state. Default the position and velocity of the reference.
     pub start: Start,
     /// Limits that stop the run. By default only divergence stops it.
     pub limits: RunLimits,

@@ -63,7 +63,7 @@ pub enum SimulationError {
         "the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia"
     )]
     MassMatrix,
-    /// The parts of a model do not fit together.
+    /// The parts of a robot model are inconsistent.
     #[error("{0}")]
     Model(#[from] ModelError),
     /// An invalid trajectory.

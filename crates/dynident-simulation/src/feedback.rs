@@ -13,12 +13,13 @@ pub(crate) struct Feedback<'a> {
     settings: &'a SensorSettings,
     is_rotary: Vec<bool>,
     random: Random,
-    /// Ring buffer of the last `delay + 1` readings, joint after joint.
+    /// Ring buffer of the last `delay + 1` sensor samples, joint after joint.
     q: Vec<f64>,
     dq: Vec<f64>,
     place: usize,
     slots: usize,
-    /// Filter share of a new difference; filtered velocity and previous position follow below.
+    /// Weight of a new velocity difference in the velocity filter; filtered velocity and previous position follow
+    /// below.
     share: f64,
     filtered: Vec<f64>,
     last_q: Vec<f64>,
@@ -50,7 +51,8 @@ impl<'a> Feedback<'a> {
         }
     }
 
-    /// Processes a reading; [`measured`](Self::measured) then returns the delayed one for the controller.
+    /// Processes a new sensor sample; [`measured`](Self::measured) then returns the delayed sample for the
+    /// controller.
     #[inline]
     pub(crate) fn read(&mut self, q: &[f64], dq: &[f64]) {
         let joints = q.len();
@@ -73,7 +75,7 @@ impl<'a> Feedback<'a> {
         }
         if !self.started {
             self.started = true;
-            // Before the run the robot rests at its start.
+            // Before the run the robot is at rest in its start position.
             for slot in 0..self.slots {
                 for joint in 0..joints {
                     self.q[slot * joints + joint] = self.last_q[joint];

@@ -1,5 +1,5 @@
-//! **Simulation**: controllers at a fixed rate, a robot with stiction, realistic sensors, and the closed loop of the
-//! three.
+//! **Simulation**: controllers at a fixed rate, a robot with stiction, realistic sensors, and the closed loop of
+//! these three.
 //!
 //! | task | use |
 //! | --- | --- |

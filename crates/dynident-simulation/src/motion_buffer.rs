@@ -1,11 +1,11 @@
-//! Blocks of samples between the loop, which processes single samples, and joint-major arrays. Without blocks every
-//! sample would access one memory page for each joint of each array, more than the processor caches; a block accesses
-//! them once in 32 samples.
+//! Buffer between the loop, which processes single samples, and arrays that are stored joint after joint. Without the
+//! buffer, every sample would access one memory page for each joint of each array, more than the processor caches.
+//! With the buffer this happens once in 32 samples.
 
 use crate::controllers::{Measured, Target};
 use crate::reference::Reference;
 
-/// Samples in a block: with 35 numbers per sample nine kilobytes.
+/// Number of samples in a block; with 35 numbers per sample it has nine kilobytes.
 const BLOCK_SAMPLES: usize = 32;
 
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use crate::error::{SimulationError, require, require_length};
 use serde::{Deserialize, Serialize};
 
-/// A setting of every joint: one value for all of them, or a list with one for each, in the model's order.
+/// A setting of every joint: one value for all joints, or a list with one value per joint in the order of the model.
 ///
 /// ```
 /// use dynident_simulation::PerJoint;

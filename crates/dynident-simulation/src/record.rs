@@ -6,7 +6,7 @@ use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use dynident_model::sample::Random;
 
-/// Separate the random numbers of positions, torques and instants.
+/// Separate the random numbers of positions, torques and sampling instants.
 const RANDOM_STREAMS: [u64; 3] = [0x5eed_0002, 0x5eed_0003, 0x5eed_0004];
 
 /// Recorded samples of a run, joint-major: joint `j`, sample `s` at `j * samples + s`.
@@ -59,9 +59,9 @@ impl SensorSettings {
     /// Records a run of a robot with these sensors.
     ///
     /// Positions between the controller's samples are cubic Hermite polynomials of position and velocity (error below
-    /// `h⁴/384` of the fourth derivative); torques are constant between samples. If the record has the controller's
-    /// instants (same rate, no jitter, drift or delay), its positions are the controller's readings, with the same
-    /// noise.
+    /// `h⁴/384` times the fourth derivative); torques are constant between samples. If the record has the same
+    /// sampling instants as the controller (same rate, no jitter, drift or delay), its positions are those that the
+    /// controller measured, with the same noise.
     ///
     /// # Errors
     /// Errors of [`validate`](Self::validate); noise or steps so large that the record would not be finite.
@@ -112,7 +112,7 @@ impl SensorSettings {
                 }
             }
         }
-        // Noise and steps are not limited, while the values of a run are finite.
+        // Noise and quantisation can exceed the range of finite numbers, although the values of a run are finite.
         if let Some(&value) = q.iter().chain(&tau).find(|value| !value.is_finite()) {
             let fix = "give position_std, torque_std, encoder_steps and torque_step sizes that a sensor can have";
             require(false, "a recorded position or torque", value, fix)?;

@@ -159,7 +159,7 @@ impl ReferenceSample {
         }
     }
 
-    /// View for controllers.
+    /// Returns a view of the sample for controllers.
     pub fn target(&self) -> Target<'_> {
         Target { q: &self.q, dq: &self.dq, ddq: &self.ddq }
     }

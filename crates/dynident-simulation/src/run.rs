@@ -147,7 +147,7 @@ pub struct Run {
     pub max_error: Vec<f64>,
     /// Root mean square of that distance of each joint.
     pub rms_error: Vec<f64>,
-    /// Number of samples with saturated torque of each joint.
+    /// Number of samples of each joint with torque at its limit.
     pub saturated: Vec<usize>,
     /// Steps without convergence of the friction torques: see
     /// [`Plant::unsettled_steps`](crate::Plant::unsettled_steps).
@@ -201,8 +201,8 @@ impl Run {
         self.reference.q[self.of(joint)].iter().zip(&self.q[self.of(joint)]).map(|(reference, q)| reference - q)
     }
 
-    /// The part with these samples, as far as the run reached; times start at the first of them. Numbers of saturated
-    /// samples and unsettled steps are those of the whole run.
+    /// The part of the run with these samples, if the run reached them; times start at the first of these samples.
+    /// Numbers of samples at the torque limit and of unsettled steps are those of the whole run.
     #[must_use]
     pub fn of_samples(&self, range: core::ops::Range<usize>) -> Self {
         let (joints, before) = (self.joints.len(), self.samples);

@@ -39,11 +39,12 @@ pub struct SensorSettings {
     pub encoder_steps: Option<PerJoint>,
     /// Standard deviation of the white noise of positions, rad (m), before quantisation. Default 0.
     pub position_std: PerJoint,
-    /// Standard deviation of the noise of torques, Nm (N). Default 0.
+    /// Standard deviation of the noise of recorded torques, Nm (N). Default 0.
     pub torque_std: PerJoint,
-    /// Correlation of the torque noise between recorded samples: AR(1), 0 (the default) for white noise.
+    /// Correlation of the torque noise of consecutive recorded samples (first-order autoregression); default 0, white
+    /// noise.
     pub torque_correlation: f64,
-    /// Quantisation step of recorded torques, Nm (N). Default none.
+    /// Quantisation step of recorded torques, Nm (N). Default none: not quantised.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_step: Option<PerJoint>,
     /// Source of the controller's velocities. Default true velocities.
@@ -53,7 +54,7 @@ pub struct SensorSettings {
     /// Rate of the record, Hz. Default the controller's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record_rate_hz: Option<f64>,
-    /// Standard deviation of the record's instants relative to its clock, s. Default 0.
+    /// Standard deviation of the sampling instants of the record (jitter) relative to its clock, s. Default 0.
     pub jitter_std_s: f64,
     /// Delay of recorded positions, s. Default 0.
     pub position_delay_s: PerJoint,

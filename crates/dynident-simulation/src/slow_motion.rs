@@ -5,8 +5,8 @@ use crate::reference::Reference;
 use dynident_excitation::Motion;
 
 impl Reference {
-    /// The motion at a share s of its speed, at the same rate: `q(s t)`, `s q̇(s t)`, `s² q̈(s t)`. Between samples
-    /// positions and velocities are cubic Hermite polynomials, and accelerations are linear.
+    /// Executes the motion at a share s of its speed, at the same sampling rate: `q(s t)`, `s q̇(s t)`, `s² q̈(s t)`.
+    /// Between samples, positions and velocities are cubic Hermite polynomials, and accelerations are linear.
     ///
     /// # Errors
     /// A share outside (0, 1].

@@ -1,8 +1,8 @@
-//! Arrays with a fixed length: a surplus value is an error.
+//! Arrays with a fixed length: a value too many is an error.
 
 use serde::Deserialize;
 
-/// Serde alone ignores surplus values.
+/// Without this function serde ignores extra values.
 fn counted<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
     let found = values.len();
     values.try_into().map_err(|_| E::custom(format!("{found} values where {N} are expected")))

@@ -1,11 +1,11 @@
-//! Code of the caller in a study in memory.
+//! Code of the calling program in a study that is in memory.
 
 use dynident_excitation::families::{FamilyError, FunctionFamily, FunctionFamilySettings, MotionFunction};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Code of a section, `None` in a study that was read from a file. Equal only to itself and its clones; never
-/// serialised.
+/// Code of the calling program for a section; `None` in a study that was read from a file. It is equal only to itself
+/// and its clones, and is never serialised.
 pub struct Code<T: ?Sized>(pub Option<Arc<T>>);
 
 impl<T: ?Sized> Default for Code<T> {
@@ -42,17 +42,17 @@ impl<T: ?Sized> core::fmt::Debug for Code<T> {
     }
 }
 
-/// `family = { kind = "function", .. }`: a family that is code of the caller.
+/// `family = { kind = "function", .. }`: a trajectory family defined by code of the calling program.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FunctionChoice {
     /// Name of the function; the calling program provides its code.
     pub function: String,
-    /// Free parameters of each joint, 1 to 1000.
+    /// Number of free parameters of each joint, 1 to 1000.
     pub parameters: usize,
-    /// Whether the motion is linear in the parameters and zero for zero parameters, which gives exact gradients; false
-    /// by default.
+    /// Whether the motion is linear in the parameters and zero if all parameters are zero; gradients are then exact.
+    /// False by default.
     #[serde(default)]
     pub linear: bool,
     /// The code.

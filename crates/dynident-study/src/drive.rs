@@ -9,66 +9,70 @@ use dynident_model::terms::{Coupling, TorqueTerm};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Shape of the Coulomb step near zero velocity.
+/// Shape of Coulomb friction near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombChoice {
     /// No Coulomb friction.
     None,
-    /// The sign of the velocity.
+    /// Sign function of the velocity.
     Sign,
-    /// `tanh(speed / width)`.
+    /// Smoothed sign function, `tanh(speed / width)`.
     Smooth,
 }
 
-/// `[drive]`: friction and drives of all joints, with exceptions by joint.
+/// Section `[drive]`: friction and drives of all joints, with exceptions by joint.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
-    /// Whether a joint has drive inertia (rotor and gear, seen from the joint); torque measured at the link does not
-    /// include it. By default `identify` tests this with the logs, and the other commands assume none.
+    /// Whether a joint has drive inertia (inertia of rotor and gear, reflected to the joint). Torque measured at the
+    /// link does not include it. By default `identify` tests with the logs whether it is present, and the other
+    /// commands assume none.
     pub drive_inertia: Option<bool>,
-    /// Viscous friction. On by default.
+    /// Whether the model has viscous friction. True by default.
     pub viscous: bool,
-    /// Coulomb friction. `"smooth"` by default.
+    /// Shape of Coulomb friction near zero velocity. `"smooth"` by default.
     pub coulomb: CoulombChoice,
-    /// Width of the smooth step, rad/s or m/s. By default 0.02 rad/s (m/s) for an arm of 1.2 m, scaled by length and
-    /// gravity for other robots: 0.017 rad/s for a UR10, 0.033 for a TX40.
+    /// Width of the smoothed sign function of Coulomb friction, rad/s or m/s. By default 0.02 rad/s (m/s) for an arm
+    /// of 1.2 m, scaled by length and gravity for other robots: 0.017 rad/s for a UR10, 0.033 for a Stäubli TX40.
     pub coulomb_width: Option<f64>,
-    /// Velocity below which the sign is zero, rad/s or m/s; 0 by default.
+    /// Velocity below which the sign function is zero, rad/s or m/s; 0 by default.
     pub coulomb_dead_band: f64,
-    /// A constant torque. On by default, except with `exportable = "urdf"` or `"mjcf"`, which cannot hold it.
+    /// Whether the model has a constant torque per joint. True by default, except with `exportable = "urdf"` or
+    /// `"mjcf"`, which cannot represent it.
     pub offset: Option<bool>,
-    /// Whether training logs share their offsets (`"shared"`, the default).
+    /// Whether training logs share their torque offsets (`"shared"`, the default).
     pub offsets: OffsetChoice,
-    /// Source of the torque gains (Nm per unit of logged torque). Those of the format (`"stated"`) by default.
+    /// Source of the torque gains (Nm per unit of logged torque). By default those of the log format (`"stated"`).
     pub gains: GainChoice,
-    /// Standard deviation of the stated gains, percent of each, independent between joints. The error bars of payloads
-    /// include it. By default the gains are exact.
+    /// Standard deviation of the gains in the log format, percent of each gain, independent between joints. The error
+    /// bars of payloads include it. By default the gains are treated as exact.
     pub gain_std_percent: Option<f64>,
-    /// Further laws of friction. None by default.
+    /// Further friction laws. None by default.
     #[serde(rename = "laws")]
     pub terms: Vec<FrictionTerm>,
-    /// Whether the keys above define the friction model (`"stated"`) or Dynident selects it with the training logs
-    /// (`"auto"`). By default `identify` selects it unless a key above states friction, and the other commands use the
-    /// keys.
+    /// Whether the keys above define the friction model (`"stated"`), or Dynident selects it with the training logs
+    /// (`"auto"`). By default `identify` selects it unless one of the keys above is given for friction, and the other
+    /// commands use the keys.
     pub friction: Option<FrictionChoice>,
     /// Largest variance inflation, caused by all other columns, at which the selection may give Coulomb friction a
-    /// separate value per direction. By default 10 in `iterate`, so that every parameter is well determined, and no
-    /// limit in the other commands.
+    /// separate value per direction. Default 10 in `iterate`, so that every parameter is well determined; no limit in
+    /// the other commands.
     pub most_inflation: Option<f64>,
-    /// Laws that the selection may use in addition to viscous friction and the Coulomb step: `asymmetric viscous`,
-    /// `asymmetric coulomb`, `sigmoid`, `stribeck`, `cube-root`, `quadratic`, `load`, `maxwell-slip`. All by default.
+    /// Laws that the selection may use in addition to viscous and Coulomb friction: `asymmetric viscous`, `asymmetric
+    /// coulomb`, `sigmoid`, `stribeck`, `cube-root`, `quadratic`, `load`, `maxwell-slip`. All by default.
     pub candidates: Option<Vec<String>>,
-    /// Uses only torque terms that this exported form holds without a loss: friction laws, and offsets and drive
-    /// inertia unless their keys state them. Bodies are then fitted together with these terms. No restriction by
-    /// default: the terms of each exported form are then fitted with the bodies of the complete model.
+    /// Uses only torque terms that this export format represents without loss. This restricts friction laws, and also
+    /// offsets and drive inertia unless their keys are given. Bodies are then fitted together with these terms. No
+    /// restriction by default: the terms of each export format are then fitted again with the bodies of the complete
+    /// model.
     pub exportable: Option<ExportableForm>,
-    /// Drives with a position controller, for logs with commands in place of torque. By default from the logs alone.
+    /// Drives with a position controller, for logs with commands instead of torque. By default their values come from
+    /// the logs alone.
     pub servo: Option<ServoSection>,
-    /// Exceptions, by joint name.
+    /// Exceptions for single joints, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
 
@@ -119,32 +123,32 @@ pub struct JointDrive {
     pub friction: Option<FrictionChoice>,
 }
 
-/// `[[coupling]]`: a drive whose velocity is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
+/// Section `[[coupling]]`: a drive whose velocity is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CouplingSection {
-    /// Name of the drive in the parameters' symbols.
+    /// Name of the drive, used in the symbols of its parameters.
     pub name: String,
     /// The two joints.
     #[serde(deserialize_with = "two")]
     pub joints: [String; 2],
-    /// Drive velocity per joint velocity; 1 and 1 by default.
+    /// Drive velocity divided by the velocity of each joint; 1 and 1 by default.
     #[serde(default = "one_one", deserialize_with = "two")]
     pub ratios: [f64; 2],
-    /// Cross inertia. On by default.
+    /// Whether the drive has cross inertia. True by default.
     #[serde(default = "yes")]
     pub inertia: bool,
-    /// Cross viscous friction. On by default.
+    /// Whether the drive has cross viscous friction. True by default.
     #[serde(default = "yes")]
     pub viscous: bool,
-    /// Coulomb friction on the velocity of this drive; by default as `drive.coulomb`.
+    /// Coulomb friction that depends on the velocity of this drive; by default the value of `drive.coulomb`.
     #[serde(default)]
     pub coulomb: Option<CoulombChoice>,
 }
 
 impl DriveSection {
-    /// Stated drive inertia of this joint; `None` if no key states it.
+    /// Whether the keys give drive inertia to this joint; `None` if no key does.
     pub(crate) fn drive_inertia_of(&self, joint: &str) -> Option<bool> {
         let in_form = (self.exportable == Some(ExportableForm::Urdf)).then_some(false);
         self.joints.get(joint).and_then(|own| own.drive_inertia).or(self.drive_inertia).or(in_form)
@@ -156,7 +160,8 @@ impl DriveSection {
         self.joints.get(joint).and_then(|own| own.offset).or(self.offset).unwrap_or(in_form)
     }
 
-    /// Stated source of this joint's friction model; `None` if all friction keys have their default values.
+    /// Source of this joint's friction model according to the keys; `None` if all friction keys have their default
+    /// values.
     pub fn friction_of(&self, joint: &str) -> Option<FrictionChoice> {
         let own = self.joints.get(joint);
         if let Some(choice) = own.and_then(|own| own.friction).or(self.friction) {

@@ -16,41 +16,42 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
-    /// Weighted least squares; instrumental variables if noise in the regressor biases the estimate and the smoothed
-    /// motion of the logs makes strong instruments.
+    /// Weighted least squares. If noise in the regressor biases this estimate and the smoothed motion of the logs
+    /// gives strong instruments, instrumental variables are used.
     #[default]
     Auto,
     /// Ordinary least squares: equal weight for all joints.
     Ordinary,
     /// Weighted least squares: each joint is weighted by its residual variance.
     Weighted,
-    /// Generalised least squares: errors of different joints at one instant are correlated.
+    /// Generalised least squares: errors of different joints at the same instant are correlated.
     Generalized,
     /// Iteratively reweighted least squares with Huber's weights: outliers get smaller weights.
     Huber,
     /// Iteratively reweighted least squares with Tukey's weights: large outliers get zero weight.
     Tukey,
-    /// Reweighted by the local noise level of each row.
+    /// Weighted least squares with the local noise level of each row.
     NoiseWeighted,
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental,
-    /// The caller's function of the rows; a study file cannot contain its code.
+    /// A function of the calling program that processes the rows; a study file cannot contain its code.
     Function,
-    /// The same as `simultaneous` with a smoothing spline.
+    /// The same as `simultaneous` with a smoothing spline as motion.
     MaximumLikelihood,
     /// Estimates motion and parameters together from noisy positions and torques. The motion is a smoothing spline, or
     /// a Fourier series if `periods` is given.
     Simultaneous,
-    /// Regression on the motion of the simulated closed loop: measured positions do not enter the regressor.
+    /// Direct and inverse dynamic identification (DIDIM): regression on the motion of the simulated closed loop.
+    /// Measured positions do not enter the regressor.
     Didim,
-    /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
+    /// Closed-loop input error (CLIE): fits the torque of the simulated closed loop to the measured torque.
     Clie,
-    /// The simulated closed loop's positions fitted to the measured ones (closed-loop output error).
+    /// Closed-loop output error (CLOE): fits the positions of the simulated closed loop to the measured positions.
     Cloe,
 }
 
 impl EstimatorMethod {
-    /// Whether it is least squares on the rows of the logs, or starts with it.
+    /// Whether the method is least squares on the rows of the logs, or starts with it.
     pub(crate) fn is_least_squares(self) -> bool {
         match self {
             Self::Auto
@@ -70,7 +71,7 @@ impl EstimatorMethod {
         }
     }
 
-    /// The name in the study file.
+    /// Name in the study file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -91,55 +92,55 @@ impl EstimatorMethod {
     }
 }
 
-/// `[estimator]`.
+/// Section `[estimator]`.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
-    /// The method; `"auto"` by default.
+    /// Estimation method; `"auto"` by default.
     pub method: EstimatorMethod,
-    /// Function name for `method = "function"`; the calling program provides the code.
+    /// Name of the function for `method = "function"`; the calling program provides the code.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub function: Option<String>,
     /// The code of `function`.
     #[serde(skip)]
     pub code: Code<dyn EstimatorRule>,
-    /// Method of the covariance for error bars; `"jackknife"` by default, which accounts for coloured residuals: each
-    /// time segment is predicted by a fit without it.
+    /// Method of the covariance for error bars. Default `"jackknife"`, which is valid for residuals that are
+    /// correlated in time: each time segment is predicted by a fit without this segment.
     pub covariance: CovarianceMethod,
-    /// Whether exported bodies, friction and drives are the physically consistent set with the best fit to the logs
-    /// (true by default), or the set nearest to the robot description that has exactly the estimated base parameters. A
-    /// table in place of `true` adds constraints on the bodies.
+    /// Whether exported bodies, friction and drives are the physically consistent parameters that fit the logs best
+    /// (true, the default). If false, they are the set nearest to the robot description that has exactly the
+    /// estimated base parameters. A table instead of `true` adds constraints on the bodies.
     pub physical: PhysicalChoice,
-    /// Whether to compute intervals of every body and friction parameter over all physically consistent robots that the
-    /// data do not reject. This needs some thousand fits; false by default. Needs `physical`.
+    /// Whether to compute intervals of every body and friction parameter over all physically consistent robots that
+    /// the data do not reject. This takes some thousand fits and needs `physical`. False by default.
     pub intervals: bool,
-    /// Rank decision: thresholds for excited columns.
+    /// Thresholds that decide whether the logs excite a column.
     pub rank: RankSettings,
-    /// Segmentation of the logs for the covariance.
+    /// Division of the logs into time segments for the covariance.
     pub segments: SegmentSettings,
-    /// Fixes poorly determined parameters at zero; off by default.
+    /// Criteria for fixing poorly determined parameters at zero; disabled by default.
     pub essential: Option<EssentialSettings>,
-    /// Search for intervals of the logs that no single model explains: contact, closed brakes, a joint on its stop, a
-    /// change of load. `"auto"` (default) reports them and leaves out of the fit what no normal operation has: drives
-    /// off, a joint on its stop, filled holes. `"set-aside"` leaves out every clear event, `"warn"` only
-    /// reports, `"off"` does not search.
+    /// Search for time intervals of the logs that no single model explains: contact, closed brakes, a joint at its
+    /// mechanical stop, a change of payload. `"auto"` (default) reports them and excludes from the fit what does not
+    /// occur in normal operation: disabled drives, a joint at its stop, interpolated gaps. `"set-aside"` excludes
+    /// every clear event, `"warn"` only reports them, `"off"` does not search.
     pub events: EventChoice,
-    /// Instruments for `method = "auto"` and `"instrumental"`. With other methods they only test whether noise in the
-    /// regressor biases least squares; `"weighted"` and `"ordinary"` run this test by default.
+    /// Instruments for `method = "auto"` and `"instrumental"`. With other methods they are only used to test whether
+    /// noise in the regressor biases least squares; `"weighted"` and `"ordinary"` do this test by default.
     pub instruments: Option<InstrumentSettings>,
-    /// Local noise estimate for `method = "noise-weighted"`.
+    /// Estimation of the local noise for `method = "noise-weighted"`.
     pub noise_levels: NoiseLevels,
     /// Period of the motion for `method = "simultaneous"` with a Fourier series.
     pub periods: PeriodSettings,
-    /// Spline motion for `method = "simultaneous"` without `periods`, and for `"maximum-likelihood"`.
+    /// Motion as a spline, for `method = "simultaneous"` without `periods`, and for `"maximum-likelihood"`.
     pub spline: SplineMotionSettings,
     /// Simulation of the closed loop for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
 }
 
 impl EstimatorSection {
-    /// Settings shared by all estimators.
+    /// Settings that all estimators share.
     pub(crate) fn common(&self) -> EstimationSettings {
         let mut settings = EstimationSettings::default();
         settings.examine_exogeneity = matches!(self.method, EstimatorMethod::Ordinary | EstimatorMethod::Weighted);
@@ -151,7 +152,8 @@ impl EstimatorSection {
         settings
     }
 
-    /// Builds the estimator of `method` with its settings; `simulated` provides the closed loop if needed.
+    /// Builds the estimator for `method` with its settings; `simulated` provides the closed loop if the method needs
+    /// it.
     pub(crate) fn estimator(
         &self,
         simulated: impl FnOnce() -> Result<Box<SimulatedLoopSettings>, StudyFileError>,

@@ -14,12 +14,12 @@ pub enum FrictionChoice {
     /// The keys of the study.
     #[default]
     Stated,
-    /// Cross-validation within the training logs. `offset` and `drive_inertia` stay in force; the stated friction is
-    /// one of the candidates.
+    /// Selection by cross-validation within the training logs. `offset` and `drive_inertia` remain as given; the
+    /// friction of the keys is one of the candidates.
     Auto,
 }
 
-/// Exported form that must hold the selected friction.
+/// Export format that must represent the selected friction without loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -28,7 +28,7 @@ pub enum ExportableForm {
     Urdf,
     /// MJCF: the same friction.
     Mjcf,
-    /// Generated functions of the current motion: all laws without memory.
+    /// Generated functions of the current motion: all laws without hysteresis.
     Code,
 }
 

@@ -1,11 +1,11 @@
-//! Converts torque terms to the study keys that state them.
+//! Converts torque terms to the study keys that describe them.
 
 use super::friction::{FrictionChoice, FrictionTerm};
 use super::{CoulombChoice, JointDrive};
 use dynident_model::terms::{CoulombShape, JointProperty, StepRole, TorqueTerm};
 
 impl JointDrive {
-    /// The keys of `[drive.joints.NAME]` that state exactly these friction terms. Drive inertia and offset have
+    /// The keys of `[drive.joints.NAME]` that describe exactly these friction terms. Drive inertia and offset have
     /// separate keys.
     pub fn stating(terms: &[TorqueTerm]) -> Self {
         let mut drive = Self {
@@ -26,7 +26,7 @@ impl JointDrive {
         drive
     }
 
-    /// Sets the basic keys of a term, or returns its entry under `laws`.
+    /// Sets the basic keys of a term, or returns its entry for `laws`.
     fn basic_or_further(&mut self, term: &TorqueTerm) -> Option<FrictionTerm> {
         match (term.property(), term.step()) {
             (Some(JointProperty::Damping), _) => self.viscous = Some(true),
@@ -36,7 +36,7 @@ impl JointDrive {
             (Some(JointProperty::Friction), Some(CoulombShape::Smooth { width })) => {
                 (self.coulomb, self.coulomb_width) = (Some(CoulombChoice::Smooth), Some(width));
             }
-            // The width of the directional step is set by the joint's key `coulomb_width`.
+            // The width of the directional sign function is set by the joint's key `coulomb_width`.
             (_, Some(CoulombShape::Smooth { width })) if term.kind().step_role() == StepRole::Joint => {
                 self.coulomb_width = Some(width);
             }

@@ -110,25 +110,25 @@ pub struct Study {
     /// Drives coupled to two joints.
     #[serde(default)]
     pub coupling: Vec<CouplingSection>,
-    /// Springs, counterbalances, cables: torques as functions of positions and velocities.
+    /// Torques that are functions of positions and velocities: springs, counterbalances, cables.
     #[serde(default)]
     pub torque: Vec<TorqueSection>,
-    /// Payloads of the logs.
+    /// Payloads that the robot carries in logs.
     #[serde(default)]
     pub payload: Vec<PayloadSection>,
-    /// An arm identified earlier.
+    /// An arm that was identified earlier.
     #[serde(default)]
     pub arm: Option<ArmSection>,
-    /// Format of all logs; a log may state its own `format`.
+    /// Format of all logs; a log can have its own `format`.
     #[serde(default)]
     pub format: Option<LogFormat>,
     /// Method for velocities and accelerations.
     #[serde(default)]
     pub motion: MotionSettings,
-    /// Low-pass filter and decimation, applied to torque and regressor.
+    /// Low-pass filter and decimation that are applied to torque and regressor.
     #[serde(default)]
     pub parallel_filter: ParallelFilterSettings,
-    /// The estimator.
+    /// Estimation method and error bars.
     #[serde(default)]
     pub estimator: EstimatorSection,
     /// Excitation trajectory of `design`.
@@ -161,7 +161,7 @@ fn check_unique<'a>(
     Ok(())
 }
 
-/// TOML has no null.
+/// TOML has no null, so keys with this value are removed.
 fn drop_nulls(value: &mut serde_json::Value) {
     match value {
         serde_json::Value::Object(entries) => {
@@ -173,7 +173,7 @@ fn drop_nulls(value: &mut serde_json::Value) {
     }
 }
 
-/// Kind of a file that is obviously not a study, and the command for it.
+/// Kind of a file that is obviously not a study, and the command to which it belongs.
 fn other_kind(text: &str, path: &Path) -> Option<(&'static str, String)> {
     let file = path.display();
     let first = text.trim_start();
@@ -196,7 +196,7 @@ fn other_kind(text: &str, path: &Path) -> Option<(&'static str, String)> {
     }
 }
 
-/// Largest study file, bytes.
+/// Largest accepted study file, bytes.
 const MAX_STUDY_BYTES: u64 = 4 << 20;
 
 impl Study {
@@ -221,7 +221,7 @@ impl Study {
         Self::parse(&text, path)
     }
 
-    /// Reads a study from its text; `path` is only named in messages.
+    /// Reads a study from its text; `path` is used in messages only.
     ///
     /// # Errors
     /// If the text is not valid TOML, a key is unknown or has the wrong type, or sections conflict; the message
@@ -249,7 +249,7 @@ impl Study {
         Ok(study)
     }
 
-    /// Builds a study from JSON with the keys of the TOML, null for a missing one. `path` appears in messages, and
+    /// Builds a study from JSON with the keys of the TOML; null means a missing key. `path` appears in messages, and
     /// files are searched relative to it.
     ///
     /// # Errors
@@ -278,11 +278,11 @@ impl Study {
     /// # Errors
     /// As [`serde_json::to_value`].
     pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
-        // Compiled once here: each generic call elsewhere would compile the writers of all sections again.
+        // Compiled once here; otherwise each generic call elsewhere would compile the writers of all sections again.
         serde_json::to_value(self)
     }
 
-    /// Checks that there is a log; a study for `design` may have none.
+    /// Checks that there is a log; only a study for `design` needs none.
     ///
     /// # Errors
     /// [`StudyError::Missing`] without a log.
@@ -315,7 +315,7 @@ impl Study {
         (0..self.log.len()).filter(|&index| self.log[index].role == role).collect()
     }
 
-    /// Parts that are code of the caller, each with its function name; a study file cannot contain them.
+    /// Parts that are code of the calling program, each with its function name; a study file cannot contain them.
     pub fn functions(&self) -> Vec<String> {
         let mut found = Vec::new();
         for torque in &self.torque {
@@ -375,7 +375,7 @@ impl Study {
         self.estimator.validate()
     }
 
-    /// Checks that only logs that are fitted to commands state the gain of their servos.
+    /// Checks that only logs that are fitted to commands have a servo gain.
     fn check_servo_gains(&self) -> Result<(), StudyError> {
         let Some(log) = self.log.iter().find(|log| log.servo_gain.is_some() && !self.fits_commands()) else {
             return Ok(());
@@ -387,7 +387,7 @@ impl Study {
         ))
     }
 
-    /// Checks that temperature-dependent friction is stated and the estimator supports it.
+    /// Checks that temperature-dependent friction is used only if the estimator supports it.
     fn check_temperature(&self) -> Result<(), StudyError> {
         let terms =
             self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
@@ -410,8 +410,8 @@ impl Study {
         Ok(())
     }
 
-    /// Whether `identify` fits the motion to commands: `[drive.servo]` is stated, or all logs have commands and no
-    /// torque.
+    /// Whether `identify` fits the motion to commands: the study has `[drive.servo]`, or all logs have commands and
+    /// no torque.
     pub fn fits_commands(&self) -> bool {
         let without_torque = |index: usize| {
             let format = self.format_of(index);
@@ -428,8 +428,8 @@ impl Study {
         self.log[index].format_or(self.format.as_ref()).expect("checked when the study was read")
     }
 
-    /// Name of log number `index`: the stated name, or that of its file with its range, which distinguishes parts of
-    /// one file.
+    /// Name of log number `index`: the given name, or the name of its file with its range, which distinguishes parts
+    /// of one file.
     ///
     /// # Panics
     /// If there is no such log.

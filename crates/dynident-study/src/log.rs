@@ -15,10 +15,10 @@ use std::path::PathBuf;
 pub struct LogSection {
     /// The main file; for samples in memory, their name.
     pub file: PathBuf,
-    /// The samples, in place of a file: a table whose columns `format` describes. Not serialised.
+    /// The samples, instead of a file: a table whose columns `format` describes. Not serialised.
     #[serde(skip)]
     pub samples: Option<MemoryLog>,
-    /// Overrides `part` of the format: the recording in a file with several.
+    /// Overrides `part` of the format: selects one recording in a file with several.
     #[serde(default)]
     pub part: Option<String>,
     /// Name in reports; the file name by default.
@@ -27,17 +27,18 @@ pub struct LogSection {
     /// Use of the log; `identify` by default.
     #[serde(default)]
     pub role: Role,
-    /// Format of this log, in place of the study's.
+    /// Format of this log, instead of the study's `format`.
     #[serde(default)]
     pub format: Option<LogFormat>,
-    /// The commanded motion, in place of that of the differentiator.
+    /// The commanded motion, instead of that in the differentiator's settings.
     #[serde(default)]
     pub reference: Option<ReferenceSettings>,
-    /// Name of the `[[payload]]` carried during the recording; no payload by default.
+    /// Name of the `[[payload]]` that the robot carries in this recording; no payload by default.
     #[serde(default)]
     pub payload: Option<String>,
-    /// Position gain of the servos in this log, relative to `stiffness` of `[drive.servo]`: one number or one of each
-    /// joint. For logs with several gains in the firmware; 0 with the position controller off. 1 by default.
+    /// Position gain of the servos in this log, relative to `stiffness` of `[drive.servo]`: one number, or one number
+    /// per joint. Use it for logs with different gains in the firmware; 0 means that the position controller is off.
+    /// 1 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub servo_gain: Option<PerJoint>,
     /// Overrides `rows` of the format.
@@ -58,7 +59,7 @@ pub struct LogSection {
 }
 
 impl LogSection {
-    /// Relative position gain of each of this number of joints; empty if the log states none.
+    /// Relative position gain of each of `joints` joints; empty if the log has none.
     pub fn servo_gains(&self, joints: usize) -> Vec<f64> {
         match &self.servo_gain {
             None => Vec::new(),
@@ -67,7 +68,7 @@ impl LogSection {
         }
     }
 
-    /// The format of this log with its range: its own, or that of the study; `None` if neither is given.
+    /// The format of this log with its range: its own format, or that of the study; `None` if neither is given.
     pub fn format_or(&self, of_study: Option<&LogFormat>) -> Option<LogFormat> {
         let mut format = self.format.as_ref().or(of_study)?.clone();
         if self.rows.is_some() || self.fraction.is_some() || self.time_range_s.is_some() {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub enum StudyLogSource {
     /// An existing file.
     File(PathBuf),
-    /// In memory.
+    /// Samples in memory.
     Memory(MemoryLog),
 }
 
@@ -32,9 +32,9 @@ impl StudyLogSource {
         }
     }
 
-    /// Whether both sources contain the same samples: the same file or files of equal content, the same table in memory
-    /// or tables of equal numbers. A file and a table are never equal. False if a file cannot be read: the error is
-    /// reported when the log is read.
+    /// Whether both sources contain the same samples: the same file or files of equal content, the same table in
+    /// memory or tables of equal numbers. A file and a table are never treated as equal. False if a file cannot be
+    /// read; the error is reported when the log is read.
     pub(crate) fn has_content_of(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::File(a), Self::File(b)) => same_file_content(a, b),
@@ -46,7 +46,7 @@ impl StudyLogSource {
     }
 }
 
-/// Whether two files have equal contents: the same path, or equal length and hash.
+/// Whether two files have equal contents: they have the same path, or equal length and hash.
 fn same_file_content(a: &Path, b: &Path) -> bool {
     if let (Ok(a), Ok(b)) = (a.canonicalize(), b.canonicalize())
         && a == b

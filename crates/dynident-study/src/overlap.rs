@@ -1,4 +1,5 @@
-//! Checks that no sample is used twice: validation logs contain no training data, and training logs differ.
+//! Checks that no sample is used twice: validation logs contain no training data, and no training data occur in two
+//! logs.
 
 use super::Study;
 use super::log_source::StudyLogSource;
@@ -7,13 +8,13 @@ use dynident_identification::{Recording, Role, Samples};
 use dynident_recording::LogFormat;
 use dynident_recording::log::{LogSamples, SharedSamples};
 
-/// Values of training logs that are kept for the comparison with later training logs: 128 MB.
+/// Maximum number of values of training logs that are kept for the comparison with later training logs: 128 MB.
 const MAX_KEPT_VALUES: usize = 1 << 24;
 
 impl Study {
-    /// Checks that no sample is used twice, for fit and validation or twice for the fit: two logs must not be the same
-    /// file (or copies) with common rows, nor contain the same samples in another file. Held-out logs are not compared
-    /// with each other. `sources` and `recordings` are the study's logs.
+    /// Checks that no sample is used twice, for fit and validation or twice for the fit. Two logs must not be the
+    /// same file (or copies) with common rows, nor contain the same samples in different files. Held-out logs are not
+    /// compared with each other. `sources` and `recordings` belong to the study's logs.
     ///
     /// # Errors
     /// [`StudyError::Overlap`], [`StudyError::SameSamples`] and [`StudyError::RepeatedRows`] with the names of both
@@ -54,7 +55,7 @@ impl Study {
         Ok(())
     }
 
-    /// The error of samples that another log shares with a training log.
+    /// The error for samples that another log shares with a training log.
     fn same_samples(&self, [other, training]: [usize; 2], shared: SharedSamples) -> StudyError {
         let [name, training] = [other, training].map(|index| self.log_name(index));
         let SharedSamples { row, other_row } = shared;
@@ -66,8 +67,8 @@ impl Study {
     }
 }
 
-/// The samples of a log; `None` for prepared motions, long logs, and logs that cannot be read: these are reported later
-/// by their reader.
+/// The samples of a log; `None` for prepared motions, long logs, and logs that cannot be read (their reader reports
+/// the error later).
 fn samples_of(recording: &Recording) -> Option<LogSamples> {
     match &recording.samples {
         Samples::Log(log) => LogSamples::read(log).ok().flatten(),
@@ -75,7 +76,7 @@ fn samples_of(recording: &Recording) -> Option<LogSamples> {
     }
 }
 
-/// Whether two parts of one file have, or may have, common rows: ranges by rows, fraction and time cannot be compared
+/// Whether two parts of one file have, or can have, common rows: ranges by rows, fraction and time cannot be compared
 /// before the file is read.
 fn may_share_rows(a: &LogFormat, b: &LogFormat) -> bool {
     if a.part.is_some() && b.part.is_some() && a.part != b.part {

@@ -1,4 +1,4 @@
-//! `[[payload]]` and `[arm]`: payloads of the logs, and an arm identified earlier.
+//! `[[payload]]` and `[arm]`: payloads in the logs, and an arm that was identified earlier.
 
 use super::arrays::exactly;
 use crate::error::StudyError;
@@ -7,43 +7,44 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[[payload]]`: a load at a link of the robot during some recordings. A `[[log]]` refers to it by name. Without
-/// `mass_kg` all its parameters are estimated; with `mass_kg` and `com_m` it is known; with `mass_kg` alone (weighed on
-/// a scale) the rest is estimated.
+/// Section `[[payload]]`: a payload at a link of the robot during some recordings. A `[[log]]` refers to it by name.
+/// Without `mass_kg` all its parameters are estimated. With `mass_kg` and `com_m` the payload is known. With
+/// `mass_kg` alone (weighed on a scale) the other parameters are estimated.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSection {
-    /// Name that logs refer to.
+    /// Name by which logs refer to the payload.
     pub name: String,
-    /// The link that it is fixed to; the payload's parameters are in the frame of this link.
+    /// The link to which the payload is fixed; the payload's parameters are in the frame of this link.
     pub link: String,
-    /// Mass, if known.
+    /// Mass, kg, if known.
     #[serde(default)]
     pub mass_kg: Option<f64>,
-    /// Centre of mass in the link's frame, if known.
+    /// Centre of mass in the link's frame, m, if known.
     #[serde(default, deserialize_with = "exactly")]
     pub com_m: Option<[f64; 3]>,
-    /// Inertia about its centre of mass, in the axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero (a point mass)
-    /// by default.
+    /// Inertia about the payload's centre of mass, in the axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz.
+    /// Zero (a point mass) by default.
     #[serde(default, deserialize_with = "exactly")]
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
 }
 
-/// `[arm]`: the arm from an earlier identification. Only payloads are estimated then; their error bars include those of
-/// the arm.
+/// Section `[arm]`: the arm from an earlier identification. Then only payloads are estimated; their error bars
+/// include those of the arm.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ArmSection {
-    /// The earlier `result.json`, of the same robot with the same drives.
+    /// Path of the earlier `result.json`, of the same robot with the same drives.
     pub result: PathBuf,
     /// Parameters of the arm that are estimated again; none by default.
     #[serde(default)]
     pub refit: Refit,
 }
 
-/// Smallest eigenvalue of a pseudo-inertia, relative to its largest entry: rounding in published values of thin bodies.
+/// Largest accepted negative eigenvalue of a pseudo-inertia, relative to its largest entry: rounding in published
+/// values of thin bodies.
 const MAX_RELATIVE_ROUNDING: f64 = 1.0e-6;
 
 impl PayloadSection {
@@ -84,8 +85,8 @@ impl PayloadSection {
         Ok(())
     }
 
-    /// Fix for an inconsistent payload. If the moments are consistent in the order of MuJoCo's `fullinertia` (xx, yy,
-    /// zz, xy, xz, yz), the line to write.
+    /// Fix for a payload that is not physically consistent. If the moments are consistent in the order of MuJoCo's
+    /// `fullinertia` (xx, yy, zz, xy, xz, yz), this is the line to write.
     fn fix(&self) -> String {
         let general = "the mass must be positive and no moment about the centre of mass larger than the sum of the other two; \
                        inertia_at_com_kgm2 has the order xx, xy, xz, yy, yz, zz";

@@ -19,9 +19,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PhysicalChoice {
-    /// On with the defaults, or off.
+    /// Physically consistent fit with the default settings, or no such fit.
     Switch(bool),
-    /// On with constraints on the robot.
+    /// Physically consistent fit with constraints on the robot.
     Known(Box<ConsistencySettings>),
 }
 
@@ -32,7 +32,7 @@ impl Default for PhysicalChoice {
 }
 
 impl PhysicalChoice {
-    /// The settings of the fit; `None` if it is switched off.
+    /// The settings of the fit; `None` if it is disabled.
     pub fn settings(&self) -> Option<ConsistencySettings> {
         match self {
             Self::Switch(true) => Some(ConsistencySettings::default()),
@@ -49,7 +49,7 @@ impl PhysicalChoice {
 impl<'de> Deserialize<'de> for PhysicalChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
-        // An untagged enum would lose which key of the table is wrong.
+        // An untagged enum would not report which key of the table is wrong.
         impl<'de> serde::de::Visitor<'de> for Visitor {
             type Value = PhysicalChoice;
             fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {

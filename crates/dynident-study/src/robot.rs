@@ -15,7 +15,7 @@ use std::path::PathBuf;
 pub struct RobotSection {
     /// URDF, MJCF, SDF, or D-H table in TOML; for a description in memory, its name.
     pub file: PathBuf,
-    /// The robot description, in place of the file. Not serialised.
+    /// The robot description, instead of the file. Not serialised.
     #[serde(skip)]
     pub description: Option<Box<Robot>>,
     /// Arguments of the program `xacro`, which expands a file with macros if permitted (`--allow-command`): `{ ur_type
@@ -47,40 +47,41 @@ pub struct RobotSection {
     /// Orientation of the base in the world: roll, pitch, yaw about fixed axes, rad.
     #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_rad: Option<[f64; 3]>,
-    /// The same in degrees; give only one of the two.
+    /// The same orientation in degrees; give only one of the two keys.
     #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_deg: Option<[f64; 3]>,
 }
 
-/// `[[robot.follow]]`: a joint that follows others and has no degree of freedom.
+/// Section `[[robot.follow]]`: a joint that follows others and has no degree of freedom.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FollowSection {
     /// The joint.
     pub joint: String,
-    /// The joints that it follows, with its velocity per velocity of each.
+    /// The joints that this joint follows, each with the ratio of this joint's velocity to its velocity.
     pub joints: BTreeMap<String, f64>,
-    /// Position when the followed joints are at zero, rad or m.
+    /// Position of this joint when the followed joints are at zero, rad or m.
     #[serde(default)]
     pub offset: f64,
 }
 
-/// `[[robot.loop]]`: a closed chain (parallelogram), cut at a joint that the robot description does not contain.
+/// Section `[[robot.loop]]`: a closed chain (parallelogram), cut at a joint that the robot description does not
+/// contain.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LoopSection {
-    /// The two links that meet.
+    /// The two links that meet at the cut.
     pub links: [String; 2],
-    /// The meeting point in the frame of each link, m.
+    /// The point where they meet, in the frame of each link, m.
     pub points_m: [[f64; 3]; 2],
-    /// The joints of the chain without drives; Dynident computes the joints they follow from the geometry.
+    /// The joints of the chain that have no drive; Dynident computes from the geometry how they follow other joints.
     pub passive: Vec<String>,
 }
 
-/// Largest component of gravity, against overflow. Robots in millimetres have 9810; other units of time give larger
-/// values.
+/// Largest accepted component of gravity; it prevents overflow. Robots in millimetres have 9810; other units of time
+/// give larger values.
 const MAX_GRAVITY_M_S2: f64 = 1e9;
 
 impl FollowSection {

@@ -1,4 +1,4 @@
-//! Robot files; the program `xacro` expands macros if permitted.
+//! Robot files; the program `xacro` expands macros if this is permitted.
 
 use crate::error::{StudyFileError, XacroError};
 use dynident_model::{MAX_DESCRIPTION_BYTES, Robot, load_robot_with, required_xacro_arguments};
@@ -9,7 +9,7 @@ use std::path::Path;
 /// Arguments and time limit of the program `xacro`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct XacroSettings {
-    /// Arguments by name: `xacro FILE NAME:=VALUE`. Missing ones have their default in the file.
+    /// Arguments by name: `xacro FILE NAME:=VALUE`. For other arguments the defaults in the file are used.
     pub arguments: BTreeMap<String, String>,
     /// Time limit of the program, s. Default [`DEFAULT_LIMIT_S`](Self::DEFAULT_LIMIT_S).
     pub limit_s: f64,
@@ -36,7 +36,7 @@ impl XacroSettings {
     }
 
     fn request(&self, file: &str) -> ProgramRequest {
-        // A name that starts with a dash would be an option.
+        // A name that starts with a dash would be read as an option.
         let file = if file.starts_with('-') { format!("./{file}") } else { file.to_owned() };
         let arguments = self.arguments.iter().map(|(name, value)| format!("{name}:={value}"));
         ProgramRequest::new(ProgramPurpose::Xacro, ["xacro".to_owned(), file].into_iter().chain(arguments))
@@ -54,14 +54,14 @@ impl Default for XacroSettings {
 pub struct LoadSettings<'a> {
     /// Settings of the program `xacro`.
     pub xacro: XacroSettings,
-    /// Whether it may be started.
+    /// Whether the program `xacro` may be started.
     pub programs: ProgramPermission<'a>,
     /// Stops the program when it returns true.
     pub is_stopped: Option<&'a dyn Fn() -> bool>,
 }
 
-/// Reads a robot file like [`dynident_model::load_robot`]. A file with xacro macros is expanded by the program `xacro`
-/// if `settings` permit that: xacro evaluates Python expressions of the file, so an untrusted file can run any command.
+/// Reads a robot file like [`dynident_model::load_robot`]. The program `xacro` expands a file with xacro macros if
+/// `settings` permit that. xacro evaluates Python expressions of the file, so an untrusted file can run any command.
 ///
 /// # Errors
 /// [`StudyFileError::Robot`] if the file cannot be read; [`StudyFileError::Xacro`] if it cannot be expanded, and for
@@ -101,7 +101,7 @@ fn expanded(path: &Path, settings: &LoadSettings<'_>) -> Result<String, XacroErr
     String::from_utf8(bytes).map_err(|_| XacroError::NotText)
 }
 
-/// Name of the expanded file, which differs from that of the input.
+/// Name of the expanded file; it differs from the name of the input.
 fn expanded_name(file: &str) -> String {
     let name = Path::new(file).file_name().map_or_else(|| file.to_owned(), |name| name.to_string_lossy().into_owned());
     let name = name.strip_suffix(".xacro").unwrap_or(&name);

@@ -34,7 +34,7 @@ impl Study {
     }
 
     /// Expands a robot file with xacro macros by the program `xacro` and keeps the result in memory, because jobs do
-    /// not start programs. Other robot files are left unread.
+    /// not start programs. Other robot files are not read here.
     ///
     /// # Errors
     /// As [`load_robot`].
@@ -48,7 +48,7 @@ impl Study {
         if self.robot.description.is_some() {
             return Ok(());
         }
-        // The job reports a file that cannot be read.
+        // If a file cannot be read, the job reports the error.
         let Ok(path) = Folders::new(self, study_path, data).find(&self.robot.file, None) else { return Ok(()) };
         if has_xacro_macros(&path).unwrap_or(false) {
             let settings = LoadSettings { xacro: self.robot.xacro_settings(), programs, is_stopped };
@@ -171,7 +171,7 @@ impl StudyRobot {
     }
 }
 
-/// The torque terms of `[drive]` and `[[coupling]]`: those of each joint, then those of coupled drives.
+/// The torque terms of `[drive]` and `[[coupling]]`: first those of each joint, then those of coupled drives.
 ///
 /// # Errors
 /// An unknown joint.
@@ -227,7 +227,8 @@ pub(crate) fn drive_choice(drive: &DriveSection, model: &Model, joint: usize) ->
     }
 }
 
-/// Step for the further friction laws: the joint's Coulomb step, or a smooth step without Coulomb friction.
+/// Sign function for the further friction laws: that of the joint's Coulomb friction, or a smoothed one if the joint
+/// has no Coulomb friction.
 pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -> CoulombShape {
     let default = JointDrive::default();
     let own = drive.joints.get(&model.joints()[joint].name).unwrap_or(&default);
@@ -235,7 +236,8 @@ pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -
     drive_choice(drive, model, joint).coulomb.unwrap_or_else(smooth)
 }
 
-/// Width of a joint's smooth step, rad/s (m/s): the stated value, or the default of a 1.2 m arm scaled to this robot.
+/// Width of a joint's smoothed sign function, rad/s (m/s): the given value, or the default for an arm of 1.2 m scaled
+/// to this robot.
 fn width(drive: &DriveSection, own: &JointDrive, model: &Model, joint: usize) -> f64 {
     let usual = || model.characteristic_scale().velocity(model.joints()[joint].is_rotary(), CoulombShape::USUAL_WIDTH);
     own.coulomb_width.or(drive.coulomb_width).unwrap_or_else(usual)

@@ -5,10 +5,10 @@ use dynident_model::{Model, Transform, Vec3};
 use dynident_servo::{Drive, Floor, FloorPoint, ServoDesignSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
-/// Force per depth of the floor, N/m: a small arm presses by less than a millimetre.
+/// Contact force per depth of penetration of the floor, N/m: a small arm presses by less than a millimetre.
 const FLOOR_STIFFNESS: f64 = 5000.0;
 
-/// A value of all joints, or one of each.
+/// One value for all joints, or one value per joint.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
@@ -19,48 +19,49 @@ pub enum PerJoint {
     Each(Vec<f64>),
 }
 
-/// `[drive.servo]`: position-controlled drives. `identify` finds their values from commands and positions; values that
-/// are stated here are where the search begins.
+/// Section `[drive.servo]`: position-controlled drives. `identify` estimates their values from commands and
+/// positions; values given here are the start of the search.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoSection {
-    /// Position gain, Nm/rad (N/m). By default from the responses in the logs.
+    /// Position gain, Nm/rad (N/m). By default estimated from the responses in the logs.
     pub stiffness: Option<PerJoint>,
-    /// Torque per velocity, Nm s/rad (N s/m). By default from the responses in the logs.
+    /// Velocity gain (torque per velocity), Nm s/rad (N s/m). By default estimated from the responses in the logs.
     pub damping: Option<PerJoint>,
-    /// Inertia of rotor and gear at the joint, kg m² (kg). By default from the responses in the logs.
+    /// Inertia of rotor and gear at the joint, kg m² (kg). By default estimated from the responses in the logs.
     pub armature: Option<PerJoint>,
-    /// Coulomb friction, Nm (N). By default from the responses in the logs.
+    /// Coulomb friction, Nm (N). By default estimated from the responses in the logs.
     pub coulomb: Option<PerJoint>,
-    /// Time from a command to its effect, s. By default from the responses in the logs.
+    /// Time from a command to its effect, s. By default estimated from the responses in the logs.
     pub delay_s: Option<PerJoint>,
-    /// Largest torque, Nm (N), in the scale of the other values. Without limit by default.
+    /// Largest torque, Nm (N), in the scale of the other values. No limit by default.
     pub torque_limit: Option<PerJoint>,
-    /// Largest acceleration of the set point, rad/s² (m/s²), if the servo moves it to a command with a profile: the
-    /// register "acceleration" of Feetech servos times 100 counts/s², "profile acceleration" of Dynamixel servos.
-    /// Without limit by default.
+    /// Largest acceleration of the set point, rad/s² (m/s²), if the servo moves the set point to a command with a
+    /// profile. This is the register "acceleration" of Feetech servos times 100 counts/s², or "profile acceleration"
+    /// of Dynamixel servos. No limit by default.
     pub profile_acceleration: Option<PerJoint>,
-    /// Largest speed of the set point, rad/s (m/s). Without limit by default.
+    /// Largest velocity of the set point, rad/s (m/s). No limit by default.
     pub profile_speed: Option<PerJoint>,
-    /// Least and greatest command that each servo accepts, rad (m); it replaces a command beyond. No limit by default.
+    /// Smallest and largest command that each servo accepts, rad (m); the servo limits commands to this range. No
+    /// limit by default.
     pub command_range: Option<Vec<[f64; 2]>>,
-    /// A floor that the robot can touch. None by default.
+    /// A floor that the robot can touch. No floor by default.
     pub floor: Option<FloorSection>,
-    /// What is known before, and the search.
+    /// Prior knowledge, and settings of the search.
     pub fit: ServoSettings,
     /// The commands that `design` computes.
     pub design: ServoDesignSettings,
 }
 
-/// `[drive.servo.floor]`: a horizontal floor.
+/// Section `[drive.servo.floor]`: a horizontal floor.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FloorSection {
     /// Height in the robot's base frame, m.
     pub height_m: f64,
-    /// Points of the robot that touch it first.
+    /// Points of the robot that touch the floor first.
     pub points: Vec<FloorPointSection>,
 }
 
@@ -69,7 +70,7 @@ pub struct FloorSection {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FloorPointSection {
-    /// The link.
+    /// Name of the link.
     pub link: String,
     /// Position in the link's frame, m.
     pub at_m: [f64; 3],
@@ -101,7 +102,7 @@ impl ServoSection {
         Ok(())
     }
 
-    /// Stated values with their keys.
+    /// Values given in the study, with their keys.
     fn stated(&self) -> impl Iterator<Item = (&'static str, &PerJoint)> {
         let all = [
             ("stiffness", &self.stiffness),
@@ -116,7 +117,7 @@ impl ServoSection {
         all.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?)))
     }
 
-    /// The drives of a study without logs: typical ones with the stated values.
+    /// The drives of a study without logs: typical drives with the values given in the study.
     ///
     /// # Errors
     /// A missing value; a list whose length differs from the number of joints.
@@ -144,7 +145,7 @@ impl ServoSection {
         Ok(stated.iter().map(with_limits).collect())
     }
 
-    /// The drives where the search begins: `start` with the stated values.
+    /// The drives with which the search begins: `start` with the values given in the study.
     ///
     /// # Errors
     /// A list whose length differs from the number of joints.
@@ -175,7 +176,7 @@ impl ServoSection {
         Ok(start)
     }
 
-    /// The floor of the robot.
+    /// The floor for the robot's simulation.
     ///
     /// # Errors
     /// A link that the robot does not have, or that does not move.
@@ -206,7 +207,7 @@ impl ServoSection {
     }
 }
 
-/// The body of a link that moves, and the place of the link in it.
+/// The body of a link that moves, and the pose of the link in the body.
 pub fn moving_link(model: &Model, name: &str) -> Option<(usize, Transform)> {
     model
         .bodies()

@@ -4,19 +4,19 @@ use dynident_estimation::{EstimationError, SimulatedSettings};
 use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
 
-/// `[estimator.simulated]`. The sample rate, integrator, velocities and delays of the feedback, start and torque limits
-/// are those of `[simulation]`; noise is not simulated.
+/// Section `[estimator.simulated]`. Sampling rate, integrator, velocities and delays of the feedback, start and
+/// torque limits are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSection {
-    /// Start of the iteration; by default the candidate nearest to the recording.
+    /// Start of the simulated motion; by default the candidate nearest to the recording.
     pub start: SimulationStart,
-    /// Step length, in error bars over all directions, at which the iteration ends; 1e-3 by default.
+    /// The iteration ends at this length of a step, in error bars over all directions; 1e-3 by default.
     pub tolerance: f64,
     /// Maximum number of steps; 30 by default.
     pub max_iterations: usize,
-    /// Finite difference step of CLIE and CLOE, relative to each parameter; 1e-4 by default.
+    /// Step of the finite differences for CLIE and CLOE, relative to each parameter; 1e-4 by default.
     pub difference: f64,
 }
 

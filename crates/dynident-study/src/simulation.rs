@@ -14,11 +14,12 @@ use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Relative spread of a body's lengths per relative spread of its mass: a third, so that the mass distributions also
-/// differ in shape.
+/// Relative variation of lengths within a body, relative to the variation of its mass: a third, so that the mass
+/// distributions also differ in shape.
 const LENGTH_SPREAD_PER_MASS_SPREAD: f64 = 1.0 / 3.0;
 
-/// `[simulation]`; every key is optional. By default a robot as described, without friction, with perfect sensors.
+/// Section `[simulation]`; every key is optional. By default the robot is as described, without friction, with
+/// perfect sensors.
 ///
 /// ```
 /// let section: dynident_study::SimulationSection = toml::from_str(
@@ -31,16 +32,16 @@ const LENGTH_SPREAD_PER_MASS_SPREAD: f64 = 1.0 / 3.0;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulationSection {
-    /// Sample rate of the controller, Hz; 1000 by default.
+    /// Sampling rate of the controller, Hz; 1000 by default.
     pub rate_hz: f64,
-    /// Deviation of the bodies from the robot description, percent: every mass is larger or smaller by this, and
-    /// lengths within bodies by up to a third of it. Bodies stay physically consistent. 0 by default.
+    /// Deviation of the simulated bodies from the robot description, percent: every mass is larger or smaller by this
+    /// percentage, and lengths within bodies by up to a third of it. Bodies stay physically consistent. 0 by default.
     pub off_percent: f64,
-    /// True friction of the joints, with the keys of `[drive]`; it may differ from the study's model. By default that
-    /// of the study.
+    /// True friction of the joints, with the keys of `[drive]`; it can differ from the friction of the study's model.
+    /// By default that of the study.
     pub drive: Option<DriveSection>,
-    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. Used only if `drive` has this term, as are the
-    /// following three.
+    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. This key and the following three are used only
+    /// if the simulated drive has the corresponding term.
     pub viscous: PerJoint,
     /// Coulomb friction, Nm (N); 0 by default.
     pub coulomb: PerJoint,
@@ -51,17 +52,18 @@ pub struct SimulationSection {
     /// Parameters of terms by their symbols (`fs1 = 2.0`); these override the keys above.
     #[serde(rename = "laws")]
     pub terms: BTreeMap<String, f64>,
-    /// Standard deviation of the true joint positions (geometry) from the robot description, m; 0 by default.
+    /// Standard deviation of the true joint positions (geometry) relative to the robot description, m; 0 by default.
     pub length_std_m: f64,
-    /// Standard deviation of the joint axes, rad.
+    /// Standard deviation of the directions of the true joint axes relative to the robot description, rad; 0 by
+    /// default.
     pub angle_std_rad: f64,
     /// Integrator; semi-implicit Euler with one step per sample by default.
     pub integrator: Integrator,
-    /// Start of a run; on the reference by default.
+    /// Start of a run; by default on the reference.
     pub start: Start,
     /// Whether torques saturate at the effort limits of the robot description; true by default.
     pub effort_limits: bool,
-    /// Limits that override those of the robot description.
+    /// Limits that stop a run; they replace those of the robot description.
     pub limits: RunLimits,
     /// Sensors; perfect by default.
     pub sensors: SensorSettings,
@@ -97,13 +99,14 @@ impl Default for SimulationSection {
 pub struct SimulatedTruth {
     /// The robot.
     pub robot: SimulatedRobot,
-    /// Its bodies.
+    /// Bodies of the simulated robot.
     pub model: Model,
-    /// The terms of its joints.
+    /// Torque terms of its joints.
     pub terms: Vec<TorqueTerm>,
     /// All parameters: ten per body, one per term.
     pub parameters: Vec<f64>,
-    /// The same as base parameters of the study's model; terms that the robot does not have are zero.
+    /// True values of the base parameters of the study's model; terms that the simulated robot does not have are
+    /// zero.
     pub base_values: Vec<f64>,
 }
 
@@ -139,7 +142,7 @@ impl SimulationSection {
         }
     }
 
-    /// Builds the simulated robot from a study's robot; `coupling` are the study's coupled drives.
+    /// Builds the simulated robot from a study's robot; `coupling` contains the study's coupled drives.
     ///
     /// # Errors
     /// Invalid numbers, bodies without inertials, terms without a parameter, a robot that cannot be simulated.
@@ -176,7 +179,7 @@ impl SimulationSection {
                         (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
                         (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
                         (None, TermAction::Constant) => Some(self.offset.of(joint)),
-                        // The value of a spring in the robot description was used above.
+                        // The stiffness of the spring in the robot description was already used above.
                         (Some(JointProperty::Stiffness), _)
                         | (
                             None,
@@ -209,7 +212,8 @@ impl SimulationSection {
         Ok(SimulatedTruth { robot: simulated, model, terms, parameters, base_values })
     }
 
-    /// True bodies. The pseudo-inertia P becomes s D P D with a diagonal D, which keeps it physically consistent.
+    /// Bodies of the simulated robot. The pseudo-inertia P becomes s D P D with a diagonal D, which keeps it
+    /// physically consistent.
     fn bodies(&self, model: &Model) -> Vec<InertialParameters> {
         let mut random = Random::new(self.seed);
         let off = 0.01 * self.off_percent;
@@ -220,7 +224,7 @@ impl SimulationSection {
                 stretch[(axis, axis)] = 1.0 + LENGTH_SPREAD_PER_MASS_SPREAD * random.uniform(-off, off);
             }
             let p = (1.0 + sign * off) * stretch * inertial.pseudo_inertia() * stretch;
-            // From second moments back to inertia: I = tr(S) 1 - S.
+            // Conversion from second moments back to inertia: I = tr(S) 1 - S.
             let trace = p[(0, 0)] + p[(1, 1)] + p[(2, 2)];
             InertialParameters([
                 p[(3, 3)],

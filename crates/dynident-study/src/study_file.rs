@@ -29,7 +29,7 @@ impl<'a> StudyFile<'a> {
         Self { study, path }
     }
 
-    /// Another study with the same path: a changed copy.
+    /// A changed copy of the study with the same path.
     pub fn with_study<'b>(self, study: &'b Study) -> StudyFile<'b>
     where
         'a: 'b,
@@ -42,7 +42,7 @@ impl<'a> StudyFile<'a> {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// The stated name of the study, or the name of its file without extension.
+    /// The name in the study, or the name of its file without extension.
     pub fn title(self) -> String {
         let stem = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         self.study.name.clone().or(stem).unwrap_or_else(|| "study".to_owned())

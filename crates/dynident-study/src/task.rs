@@ -1,4 +1,4 @@
-//! From a study to an identification task: recordings, estimator settings, joints with friction selection.
+//! Converts a study to an identification task: recordings, estimator settings, joints with friction selection.
 
 use super::friction::FrictionChoice;
 use super::log_source::StudyLogSource;
@@ -28,7 +28,7 @@ impl Study {
         self.task_with(self.settings(path, robot)?, robot, folders)
     }
 
-    /// As [`task`](Self::task), with other settings.
+    /// Like [`task`](Self::task), with other settings.
     ///
     /// # Errors
     /// Missing files, or a commanded motion that does not match the robot.
@@ -162,7 +162,7 @@ impl Study {
         Ok(settings)
     }
 
-    /// Closed loop for estimators that simulate it: `[controller]`, `[simulation]` and `[estimator.simulated]`.
+    /// Closed loop for estimators that simulate it, from `[controller]`, `[simulation]` and `[estimator.simulated]`.
     fn simulated_loop(&self, path: &Path, robot: &StudyRobot) -> Result<SimulatedLoopSettings, StudyFileError> {
         let method = format!("estimator.method = \"{}\"", self.estimator.method.name());
         let Some(controller) = &self.controller else {
@@ -196,13 +196,13 @@ impl Study {
         names.filter(|name| self.drive.drive_inertia_of(name).is_none()).cloned().collect()
     }
 
-    /// Joints without drive inertia that neither a key states nor a test checks, with the reason.
+    /// Joints for which no key gives drive inertia and no test checks it, with the reason.
     pub fn drive_inertia_untested(&self, robot: &StudyRobot) -> Option<DriveInertiaChoice> {
         let (reason, joints) = (self.why_drives_are_untested()?, self.unstated_drives(robot));
         (!joints.is_empty()).then(|| DriveInertiaChoice::untested(joints, reason))
     }
 
-    /// Reason why unstated drive inertia is not tested; `None` if it is.
+    /// Reason why drive inertia without a key is not tested; `None` if it is tested.
     fn why_drives_are_untested(&self) -> Option<&'static str> {
         let method = self.estimator.method;
         if self.arm.is_some() {
@@ -214,8 +214,8 @@ impl Study {
         }
     }
 
-    /// The joints with friction selection: those with `friction = "auto"`, and by default those without a friction key,
-    /// unless the study rules selection out.
+    /// The joints with friction selection: those with `friction = "auto"`, and by default those without a friction
+    /// key, unless the study does not permit selection.
     fn friction_searches(&self, robot: &StudyRobot) -> Vec<FrictionSearch> {
         let by_default = self.why_friction_is_stated().is_none();
         let is_chosen = |name: &str| match self.drive.friction_of(name) {
@@ -245,7 +245,7 @@ impl Study {
             .collect()
     }
 
-    /// Reason why friction without a key is not selected; `None` if it is.
+    /// Reason why friction without a key is not selected; `None` if it is selected.
     fn why_friction_is_stated(&self) -> Option<&'static str> {
         let estimator = &self.estimator;
         if self.arm.is_some() {

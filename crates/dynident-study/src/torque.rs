@@ -1,4 +1,5 @@
-//! `[[torque]]`: declared torques as functions of positions and velocities: springs, counterbalances, cables.
+//! `[[torque]]`: declared (user-defined) torques as functions of positions and velocities, for springs,
+//! counterbalances, cables.
 
 use super::{Code, Folders, Study};
 use crate::error::{StudyError, StudyFileError};
@@ -12,30 +13,30 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Largest table file, bytes; 200 points need far less.
+/// Largest accepted table file, bytes; 200 points need far less.
 const MAX_TABLE_BYTES: u64 = 1 << 20;
 
-/// `[[torque]]`: `coefficient · f(q, dq)` on one joint, with an unknown coefficient. The sign is that of the drive's
-/// torque: a spring that pulls back to `q0` is `q - q0`.
+/// Section `[[torque]]`: a torque `coefficient · f(q, dq)` on one joint, with an unknown coefficient. The sign is
+/// that of the drive's torque: a spring that pulls back to `q0` is `q - q0`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TorqueSection {
     /// Name of the coefficient in results: a letter, then letters, digits and `_`.
     pub name: String,
-    /// The joint that it acts on.
+    /// Name of the joint on which the torque acts.
     pub joint: String,
-    /// `f` as an expression: `sin(q - 0.3)`, with `q`, `dq` of this joint, `q(NAME)` or `q3` of others, rad and rad/s
-    /// (m, m/s).
+    /// Function `f` as an expression: `sin(q - 0.3)`, with `q`, `dq` of this joint, `q(NAME)` or `q3` of other
+    /// joints, rad and rad/s (m, m/s).
     #[serde(default)]
     pub expression: Option<String>,
-    /// `f` as points `[position, torque]` of this joint, ascending, with a smooth curve between them.
+    /// Function `f` as points `[position, torque]` of this joint, ascending, with a smooth curve between them.
     #[serde(default)]
     pub table: Option<Vec<[f64; 2]>>,
-    /// The same points in a file: CSV with a column of positions and one of torques.
+    /// Function `f` as points in a file: CSV with one column of positions and one of torques.
     #[serde(default)]
     pub table_file: Option<PathBuf>,
-    /// Name of the caller's function of positions and velocities; the calling program provides the code.
+    /// Name of the calling program's function of positions and velocities; that program provides the code.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<String>,
     /// The code of `function`.
@@ -44,7 +45,7 @@ pub struct TorqueSection {
     /// Expected value of the coefficient: used in the prior, and in the robot that `simulate` simulates.
     #[serde(default)]
     pub nominal: Option<f64>,
-    /// Unit of the coefficient, free text; by default `Nm` for an expression and `1` for a table.
+    /// Unit of the coefficient, any text; by default `Nm` for an expression and `1` for a table.
     #[serde(default)]
     pub unit: Option<String>,
 }
@@ -79,7 +80,7 @@ impl TorqueSection {
         Ok(())
     }
 
-    /// The law with code of the caller; it may depend on all joints.
+    /// The torque law with code of the calling program; it can depend on all joints.
     fn own_law(&self, name: &str, joints: usize) -> Result<DeclaredLaw, StudyError> {
         let code = self.code.0.as_ref().ok_or_else(|| {
             let fix = "no file holds code: set it in the calling program, or give an expression";
@@ -150,7 +151,7 @@ pub(super) fn declared_terms(
     study.torque.iter().map(of_section).collect()
 }
 
-/// Reads a table of two columns; a first line without numbers is a header.
+/// Reads a table of two columns; a first line that contains no numbers is a header.
 fn read_table(path: &Path) -> Result<TorqueTable, StudyFileError> {
     let cannot = |source| StudyFileError::File { path: path.to_owned(), source };
     let at = |line: u64, message: String| StudyFileError::Table { path: path.to_owned(), line, message };

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// First second without an RFC 3339 text: the year 10000, s since 1970.
+/// First time that RFC 3339 cannot represent, the year 10000, s since 1970.
 pub(crate) const END_OF_RFC3339_S: f64 = 253_402_300_800.0;
 
 const UNKNOWN: &str = "unknown (the clock of the computer is not set)";
 
-/// Current time; a clock before 1970 or after the year 9999 is treated as not set.
+/// Current time. A clock before 1970 or after the year 9999 is treated as not set.
 pub(crate) fn now() -> String {
     utc(SystemTime::now()).unwrap_or_else(|| UNKNOWN.to_owned())
 }
@@ -15,7 +15,7 @@ pub(crate) fn now() -> String {
 /// A time in UTC with a resolution of 1 s; `None` before 1970 and after the year 9999.
 pub(crate) fn utc(at: SystemTime) -> Option<String> {
     let since = at.duration_since(UNIX_EPOCH).ok()?;
-    // The formatter panics for other times.
+    // The formatter panics for later times.
     (since.as_secs() < END_OF_RFC3339_S as u64).then(|| humantime::format_rfc3339_seconds(at).to_string())
 }
 

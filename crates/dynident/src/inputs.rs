@@ -1,4 +1,4 @@
-//! Input files of a job: they are not overwritten, and must not change during the job.
+//! Input files of a job: they must not be overwritten, and must not change during the job.
 
 use crate::error::Error;
 use crate::study::{Study, StudyFile};
@@ -7,7 +7,7 @@ use dynident_model::collision::find_mesh;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Largest robot description that is searched for meshes and included files, bytes.
+/// Largest robot description that is searched for the names of meshes and included files, bytes.
 const MAX_ROBOT_BYTES: u64 = 64 << 20;
 
 /// State of a study's files at the start of a job.
@@ -24,7 +24,7 @@ impl InputFiles {
         }
         let seen = SeenFiles::default();
         for file in files {
-            // A recording may consist of several files. Its reader reports errors.
+            // A recording can consist of several files. Its reader reports errors.
             for part in dynident_recording::log::files(&file).unwrap_or_default() {
                 let _ = seen.is_unchanged(&part);
             }
@@ -32,7 +32,7 @@ impl InputFiles {
         Self(seen)
     }
 
-    /// Checks that no file has changed since.
+    /// Checks that no file has changed since the start of the job.
     ///
     /// # Errors
     /// [`Error::Changed`] with the first changed file.
@@ -40,8 +40,8 @@ impl InputFiles {
         self.0.first_changed().map_or(Ok(()), |path| Err(Error::Changed { path }))
     }
 
-    /// Runs a job that reads the files. A change during the job is an error even if the job failed, because its numbers
-    /// and the hashes in its provenance may belong to different contents.
+    /// Runs a job that reads the files. A change of a file during the job is an error even if the job failed, because
+    /// the numbers of the job and the hashes in its provenance may belong to different contents.
     ///
     /// # Errors
     /// [`Error::Changed`], and errors of the job.
@@ -68,7 +68,7 @@ fn files_of_robot(robot: &Path) -> Vec<PathBuf> {
     names.into_iter().filter_map(|name| find_mesh(folder, name)).collect()
 }
 
-/// Checks that none of `outputs` (files or folders, which may not exist yet) is or contains one of `inputs`, also under
+/// Checks that none of `outputs` (files or folders, which need not exist) is or contains one of `inputs`, also under
 /// another path or through a link.
 ///
 /// # Errors
@@ -86,9 +86,9 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<(),
     Ok(())
 }
 
-/// The study file, and every existing file that the study refers to in `sections` (`robot`, `log`, ..). Every text of
-/// these sections is tested: in the study's folders, and next to the files found there (as the `file` keys of a log's
-/// channels). So no key can be forgotten.
+/// The study file, and every existing file to which the study refers in `sections` (`robot`, `log`, ..). Every text
+/// in these sections is treated as a possible file name, so that no key can be forgotten. Files are searched in the
+/// study's folders, and next to the files found there (for the `file` keys of a log's channels).
 pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, sections: &[&str]) -> Vec<PathBuf> {
     let study = StudyFile::new(study, study_path);
     named_files(study, data, |section| sections.contains(&section))

@@ -5,7 +5,7 @@
 //! | read a study file | [`Study::load`], [`Study::parse`] |
 //! | logs to a model | [`identify()`]; result: [`ResultFile`], page: [`IdentificationOutcome::report`] |
 //! | validate a model on other logs | [`validate()`] |
-//! | logs to factors, and factors to one model | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
+//! | reduce logs to triangular factors, and factors to one model | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
 //! | figures and tables for papers | [`Figure`] |
 //! | predict torque along a motion, with its error band | [`TorquePredictor`] |
 //! | inspect a robot description | [`inspect()`]; correct it: [`mended()`] |
@@ -19,7 +19,7 @@
 //! | sections of a study, parts of results | [`study`], [`result`] |
 //! | progress | [`Progress`] in [`RunOptions`] |
 //!
-//! A study may contain its samples and its robot in memory ([`samples`](study::LogSection::samples),
+//! A study can contain its samples and its robot in memory ([`samples`](study::LogSection::samples),
 //! [`description`](study::RobotSection::description)). [`identification`] works on arrays without a study. The lower
 //! crates are re-exported:
 //! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],

@@ -3,8 +3,8 @@
 use crate::error::Error;
 use std::path::Path;
 
-/// Writes `contents` to `path` through a temporary file in the same folder: readers see either the old or the new file,
-/// and an error leaves the old file. Stale temporary files of this file are removed.
+/// Writes `contents` to `path` through a temporary file in the same folder. Readers see either the old or the new
+/// file, and after an error the old file remains. Old temporary files of this file are removed.
 ///
 /// # Errors
 /// [`Error::Output`] with the reason from the operating system.
@@ -12,7 +12,7 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), Error> {
     dynident_system::write_atomically(path, contents).map_err(|source| Error::Output { path: path.to_owned(), source })
 }
 
-/// Checks before a long job whether [`write_atomically`] can write into `folder`, which may not exist yet. Leaves no
+/// Checks, before a long job, whether [`write_atomically`] can write into `folder`, which need not exist. Leaves no
 /// files.
 ///
 /// # Errors

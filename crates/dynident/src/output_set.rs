@@ -8,18 +8,19 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 const STAGE_PREFIX: &str = ".dynident-set-";
-/// Its subfolders: new files, old files, and the final content of each file's place for either case.
+/// Subfolders of a stage: new files, old files, and the final content of each file's place for either case.
 const NEW: &str = "new";
 const OLD: &str = "old";
 const PLACE_NEW: &str = "place-new";
 const PLACE_OLD: &str = "place-old";
-/// Links at the files' places, which lead through [`CURRENT`].
+/// Links at the places of the files; they lead through [`CURRENT`].
 const LINKS: &str = "links";
-/// A link to [`OLD`], then to [`NEW`]: this single step switches all files.
+/// A link to [`OLD`], later to [`NEW`]: changing this link switches all files in a single step.
 const CURRENT: &str = "current";
 const NEXT: &str = "next";
 const NAMES: &str = "names";
-/// Without links: the old files, and a marker that all of them have been moved, so that the new files may follow.
+/// On file systems without links: the old files, and a marker that all of them have been moved, so that the new files
+/// can be moved to their places.
 const MOVED: &str = "moved";
 const DECIDED: &str = "decided";
 /// Subfolders of a stage that contain files under the names of the set.
@@ -30,11 +31,11 @@ const MAX_NAMES_BYTES: u64 = 1 << 20;
 const LOCK_TIMEOUT: Duration = Duration::from_secs(20);
 const LOCK_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Files of one result in a folder. Other files in the folder are not touched.
+/// The files of one result in a folder. Other files in the folder are not changed.
 ///
-/// At every moment, also after a kill or with a full disk, readers find the files of one set, the old or the new one.
-/// On a file system without links (FAT; Windows without the right to create them) a kill leaves an incomplete set, but
-/// never a mixture of two; the next write cleans up.
+/// At every moment, also after a kill or with a full disk, readers find the files of one set, either the old or the
+/// new one. On a file system without links (FAT; Windows without the right to create them) a kill can leave an
+/// incomplete set, but never a mixture of two sets; the next write cleans up.
 #[derive(Clone, Debug)]
 pub struct OutputSet {
     folder: PathBuf,
@@ -42,7 +43,7 @@ pub struct OutputSet {
 }
 
 impl OutputSet {
-    /// An empty set for a folder, which may not exist yet.
+    /// Creates an empty set for a folder, which need not exist.
     pub fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), files: Vec::new() }
     }
@@ -54,7 +55,7 @@ impl OutputSet {
         self
     }
 
-    /// Marks a file of other sets that this set does not have: an older one is removed.
+    /// Marks a file that other sets contain and this set does not: an older file with this name is removed.
     #[must_use]
     pub fn absent(mut self, name: &str) -> Self {
         self.files.push((name.to_owned(), None));
@@ -133,7 +134,8 @@ impl Stage {
         Ok(stage)
     }
 
-    /// Whether the file system supports symbolic and hard links. A full disk is ignored here; the exchange reports it.
+    /// Whether the file system supports symbolic and hard links. A full disk is ignored here, because the exchange
+    /// reports it.
     fn has_links(&self) -> bool {
         let (soft, hard) = (self.path.join("soft"), self.path.join("hard"));
         let full = |error: io::Error| matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
@@ -143,8 +145,8 @@ impl Stage {
         has
     }
 
-    /// Redirects every name to its old file through one link, switches that link to the new files, and replaces the
-    /// links by the new files. All steps that need disk space precede the first change of a file's place.
+    /// Redirects every name to its old file through one link, switches this link to the new files, and replaces the
+    /// links by the new files. All steps that need disk space come before the first change of a file.
     fn exchange(self) -> Result<(), Failed> {
         self.prepare().map_err(|failed| self.given_up(failed))?;
         for name in &self.names {
@@ -156,7 +158,7 @@ impl Stage {
         self.places_synced().map_err(|failed| self.given_up(failed))?;
         let turned = fs::rename(self.path.join(NEXT), self.path.join(CURRENT)).map_err(at(&self.path));
         turned.map_err(|failed| self.given_up(failed))?;
-        // The new set is in force. The next write cleans up whatever fails from here on.
+        // The new set is now valid. If a later step fails, the next write cleans up.
         if self.synced(&[""]).is_ok() {
             self.settle();
         }
@@ -190,15 +192,16 @@ impl Stage {
         self.synced(&[OLD, PLACE_OLD, PLACE_NEW, LINKS, ""])
     }
 
-    /// Target of the link at a file's place: a relative path to the stage, so that the folder can be moved or copied.
+    /// Target of the link that replaces a file: a relative path to the stage, so that the folder can be moved or
+    /// copied.
     fn link_of(&self, name: &str) -> PathBuf {
         let depth = Path::new(name).components().count() - 1;
         let up: PathBuf = std::iter::repeat_n("..", depth).collect();
         up.join(self.path.file_name().unwrap_or_default()).join(CURRENT).join(name)
     }
 
-    /// Replaces the links by the files of the set in force and removes the stage. Needs no disk space. A failure is
-    /// harmless: the links lead to the same files.
+    /// Replaces the links by the files of the valid set and removes the stage. Needs no disk space. A failure is
+    /// harmless, because the links lead to the same files.
     fn settle(&self) {
         let in_force = fs::read_link(self.path.join(CURRENT)).unwrap_or_default();
         let places = if in_force == Path::new(NEW) { PLACE_NEW } else { PLACE_OLD };
@@ -221,7 +224,8 @@ impl Stage {
         failed
     }
 
-    /// Without links: moves all old files away before the first new one is placed, so that two sets are never mixed.
+    /// On file systems without links: moves all old files away before the first new file is moved to its place, so
+    /// that two sets are never mixed.
     fn put(self) -> Result<(), Failed> {
         for name in &self.names {
             let (place, old) = (self.folder.join(name), self.path.join(MOVED).join(name));
@@ -296,7 +300,7 @@ impl Stage {
     }
 }
 
-/// Cleans up after a killed program: replaces links by the files of the set in force.
+/// Cleans up after a killed program: replaces links by the files of the valid set.
 fn settle_interrupted(folder: &Path) {
     let stages =
         names(folder).unwrap_or_default().into_iter().filter(|name| name.to_string_lossy().starts_with(STAGE_PREFIX));
@@ -313,9 +317,9 @@ fn settle_interrupted(folder: &Path) {
     }
 }
 
-/// Names of the set in a stage in `folder`. The folder may come from an untrusted source, so `None` (leave the stage)
-/// if a name or a symbolic link leads out of the stage or of `folder`; moving its files could overwrite or remove other
-/// files.
+/// Names of the files in a stage in `folder`. The folder can come from an untrusted source. If a name or a symbolic
+/// link leads out of the stage or of `folder`, returns `None`, and the stage remains: moving its files could
+/// overwrite or remove other files.
 fn names_of_stage(folder: &Path, stage: &Path) -> Option<Vec<String>> {
     let is_through_link = |way: &Path| {
         let mut above = way.ancestors().skip(1).filter(|above| !above.as_os_str().is_empty());
@@ -334,8 +338,8 @@ fn names_of_stage(folder: &Path, stage: &Path) -> Option<Vec<String>> {
     names.iter().all(is_inside).then_some(names)
 }
 
-/// Keeps the content of a place under two names: one to read, one to restore. A symbolic link of the user is restored
-/// as a link.
+/// Keeps the content of a file under two names: one for readers, one for restoring. A symbolic link of the user is
+/// restored as a link.
 fn keep_old(place: &Path, is_link: bool, read: &Path, back: &Path) -> io::Result<()> {
     if is_link {
         let target =
@@ -343,7 +347,7 @@ fn keep_old(place: &Path, is_link: bool, read: &Path, back: &Path) -> io::Result
         soft_link(&target, read)?;
         return soft_link(&fs::read_link(place)?, back);
     }
-    // The file of another user may refuse hard links; then its content is copied.
+    // If the system refuses a hard link to another user's file, its content is copied.
     for kept in [read, back] {
         fs::hard_link(place, kept).or_else(|_| fs::copy(place, kept).and_then(|_| File::open(kept)?.sync_all()))?;
     }

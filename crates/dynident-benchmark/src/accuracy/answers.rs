@@ -28,14 +28,14 @@ pub(super) fn weighted(rows: &Rows<'_>, covariance: CovarianceMethod) -> Result<
     estimated(rows, Estimator::Weighted, covariance)
 }
 
-/// Fit to the record filtered at twice the automatic cut-off.
+/// Fit to the record with a filter of twice the automatic cut-off frequency.
 pub(super) fn wide(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let cutoff_hz = 2.0 * trial.cutoff_hz;
     let motion = pipeline::differentiated(trial.record, cutoff_hz).map_err(|_| EstimationError::Empty)?;
     weighted(&filtered(trial, &motion, cutoff_hz)?, CovarianceMethod::Jackknife)
 }
 
-/// Fit with the regressor of the true motion: separates the cost of differentiation from that of decimation.
+/// Fit with the regressor of the true motion: separates the error due to differentiation from that due to decimation.
 pub(super) fn true_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = filtered(trial, &with_motion(trial, &trial.scenario.motion), trial.cutoff_hz)?;
     weighted(&rows, CovarianceMethod::Jackknife)
@@ -47,11 +47,11 @@ fn with_motion(trial: &Trial<'_>, motion: &Motion) -> MotionBlock {
 }
 
 fn filtered<'a>(trial: &Trial<'a>, motion: &MotionBlock, cutoff_hz: f64) -> Result<Rows<'a>, EstimationError> {
-    // A failing pipeline is a failure of the estimator; its reason is not needed.
+    // A failure of the pipeline is a failure of the estimator; its reason is not needed.
     Rows::new(trial.scenario, motion, Some(cutoff_hz)).map_err(|_| EstimationError::Empty)
 }
 
-/// As `huber` and `tukey` of `identify` on stored rows, to a hundredth of an error bar.
+/// Like `huber` and `tukey` of `identify`, on stored rows, with a tolerance of a hundredth of an error bar.
 pub(super) fn robust(rows: &Rows<'_>, weight: RowWeight) -> Result<Answer, IdentificationError> {
     let settings =
         RobustSettings { weight, covariance: CovarianceMethod::Jackknife, tolerance: 1.0e-2, ..Default::default() };
@@ -59,14 +59,14 @@ pub(super) fn robust(rows: &Rows<'_>, weight: RowWeight) -> Result<Answer, Ident
     Ok(answer(found.estimate))
 }
 
-/// Instruments are the regressor of the commanded motion.
+/// Instrumental variables; the instruments are the regressor of the commanded motion.
 pub(super) fn instrumental(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let instruments = filtered(trial, &with_motion(trial, &trial.scenario.reference), trial.cutoff_hz)?;
     let problem = trial.rows.instrumented(&instruments)?;
     Ok(answer(instrumental_variables(&problem, &InstrumentalSettings::default())?.estimate))
 }
 
-/// The best physically consistent parameters for all rows of the Fourier series' motion, without error bars.
+/// The best physically consistent parameters for all rows, with the motion from a Fourier series, without error bars.
 pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = trial.shared.periodic(trial)?;
     let sigma = rows.estimate(Estimator::Weighted, CovarianceMethod::White)?.joint_sigma;
@@ -76,7 +76,8 @@ pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, IdentificationError>
     Ok(Answer { values: fit.base_values, half_width_95: None, converged: true })
 }
 
-/// Motion and parameters together, starting from the Fourier fit of the positions and the pipeline's parameters.
+/// Estimates motion and parameters together, starting from the Fourier fit of the positions and the pipeline's
+/// parameters.
 pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let start = trial.rows.estimate(Estimator::Weighted, CovarianceMethod::White)?;
     let record = PeriodicRecord { rate_hz: RATE_HZ, q: trial.record.q.clone(), tau: trial.record.tau.clone() };
@@ -88,14 +89,15 @@ pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, IdentificationEr
         .into_iter()
         .flat_map(|what| joints.iter().map(move |joint| format!("{what} of {joint}")))
         .collect();
-    // The model is complete, so the white covariance is correct.
+    // The model is complete, so the white-noise covariance is correct.
     let settings = SimultaneousSettings { covariance: CovarianceMethod::White, ..SimultaneousSettings::default() };
     let names = trial.rows.problem.columns().to_vec();
     let problem = SimultaneousProblem { names, channels, motion, parameters: start.values };
     Ok(answer(simultaneous_least_squares(&problem, &settings, &mut model)?.estimate))
 }
 
-/// Motion and parameters together without known excitation frequencies, starting from the pipeline's parameters.
+/// Estimates motion and parameters together without known frequencies of the excitation, starting from the pipeline's
+/// parameters.
 pub(super) fn spline_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let start = trial.rows.estimate(Estimator::Weighted, CovarianceMethod::White)?;
     let Record { q, tau, .. } = trial.record.clone();

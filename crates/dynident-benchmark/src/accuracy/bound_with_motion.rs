@@ -5,7 +5,7 @@ use super::scenario::{RATE_HZ, SERIES, Scenario};
 use dynident_estimation::{ChannelNoise, ChannelRows, EstimationError, SimultaneousModel, simultaneous_bound};
 use dynident_identification::estimators::{PeriodicModel, PeriodicRecord};
 
-/// Rows of positions and torques at the truth, by sample.
+/// Rows of positions and torques at the true parameters, by sample.
 pub(super) struct BoundWithMotion<'a> {
     names: &'a [String],
     motion: usize,
@@ -22,8 +22,8 @@ impl<'a> BoundWithMotion<'a> {
         Ok(Self { names, motion: motion.len(), joints: scenario.model.dof(), rows })
     }
 
-    /// Bound of every base parameter's standard deviation for a motion with unknown coefficients of a Fourier series
-    /// at the excitation's frequencies.
+    /// Bound of every base parameter's standard deviation, if the motion is a Fourier series with the excitation's
+    /// frequencies and unknown coefficients.
     pub(super) fn of(&self, level: &NoiseLevel) -> Result<Vec<f64>, EstimationError> {
         let rho = level.torque_correlation;
         let position = ChannelNoise { std: level.position_std_rad(), autoregression: Vec::new() };

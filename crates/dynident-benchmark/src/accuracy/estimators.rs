@@ -1,4 +1,4 @@
-//! Registry of compared estimators. **To add an estimator, add one line to [`ESTIMATORS`].**
+//! Registry of the compared estimators. **To add an estimator, add one line to [`ESTIMATORS`].**
 
 use super::answers::{
     estimated, instrumental, physical, robust, simultaneous, spline_motion, true_motion, weighted, wide,

@@ -1,4 +1,4 @@
-//! Results of a cell from the answers of its runs.
+//! Results of a cell (one estimator, robot and noise level) from the answers of its runs.
 
 use super::trial::Answer;
 use serde::Serialize;
@@ -7,19 +7,19 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterFigures {
-    /// Symbol of its column.
+    /// Symbol of the base parameter.
     pub symbol: String,
-    /// Its true value.
+    /// True value of the parameter.
     pub truth: f64,
-    /// Cramér-Rao bound of its standard deviation.
+    /// Cramér-Rao lower bound of the parameter's standard deviation, for exactly known motion.
     pub bound: f64,
     /// The bound for unknown motion, with information about the motion from the noisy positions only.
     pub bound_with_motion: f64,
-    /// Mean error of the runs without failure.
+    /// Mean error over the runs without failure.
     pub bias: f64,
-    /// RMS error of these runs.
+    /// RMS error over the runs without failure.
     pub rmse: f64,
-    /// Coverage of their 95 % intervals, percent.
+    /// Percentage of the 95 % intervals that contain the true value.
     pub coverage_percent: Option<f64>,
 }
 
@@ -27,15 +27,15 @@ pub struct ParameterFigures {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CellFigures {
-    /// The robot.
+    /// Name of the robot.
     pub robot: String,
-    /// The noise level.
+    /// Name of the noise level.
     pub noise: String,
-    /// The estimator.
+    /// Name of the estimator.
     pub estimator: String,
     /// Number of runs.
     pub runs: usize,
-    /// Runs without a result, not converged, or diverged (error above 50 times that of the start).
+    /// Runs without a result, not converged, or diverged (error more than 50 times that of the start values).
     pub failures: usize,
     /// `√(mean over parameters of (bias/bound)²)`. Its sampling error is about `RMSE over bound / √runs`.
     pub bias_over_bound: Option<f64>,
@@ -44,20 +44,20 @@ pub struct CellFigures {
     /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the optimum of an unbiased estimator with unknown
     /// motion.
     pub rmse_over_bound_with_motion: Option<f64>,
-    /// The parameter with the largest RMSE over bound.
+    /// Symbol of the parameter with the largest ratio of RMS error to Cramér-Rao bound.
     pub worst_parameter: Option<String>,
-    /// Its RMSE over bound.
+    /// Ratio of RMS error to Cramér-Rao bound of that parameter.
     pub worst_rmse_over_bound: Option<f64>,
-    /// Coverage of all 95 % intervals, percent.
+    /// Percentage of all 95 % intervals that contain the true value.
     pub coverage_percent: Option<f64>,
     /// Mean processor time of one estimate, without shared rows, milliseconds. The only result that varies between
     /// repetitions.
     pub time_ms: f64,
-    /// Every base parameter.
+    /// Results of every base parameter.
     pub parameters: Vec<ParameterFigures>,
 }
 
-/// Limit of divergence as in BIRDy: error relative to that of the start.
+/// Error relative to that of the start values above which a run is treated as diverged, as in BIRDy.
 const MAX_ERROR_OVER_START: f64 = 50.0;
 
 /// Whether an answer is usable: converged, finite, and at most 50 times as far from the truth as the start (norms over

@@ -40,7 +40,7 @@ use thiserror::Error as ThisError;
 /// Name and version of the schema of [`BenchmarkFile`].
 pub const BENCHMARK_SCHEMA: &str = "dynident/benchmark/1";
 
-/// Relative standard deviation of the starts about the truth, as in BIRDy.
+/// Relative standard deviation of the start values about the true values, as in BIRDy.
 const START_SPREAD: f64 = 0.15;
 
 /// Errors of the benchmark.
@@ -55,7 +55,7 @@ pub enum BenchmarkError {
         option: &'static str,
         /// The name.
         name: String,
-        /// The known names.
+        /// Names that the benchmark has.
         known: Vec<&'static str>,
     },
     /// Error bars need at least two runs. Write a number within the range.
@@ -110,15 +110,15 @@ impl From<IdentificationError> for BenchmarkError {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkSettings {
-    /// Names of [`ROBOTS`].
+    /// Names of entries of [`ROBOTS`].
     pub robots: Vec<String>,
-    /// Names of [`NOISE_LEVELS`].
+    /// Names of entries of [`NOISE_LEVELS`].
     pub noise: Vec<String>,
-    /// Names of [`ESTIMATORS`].
+    /// Names of entries of [`ESTIMATORS`].
     pub estimators: Vec<String>,
     /// Runs per robot and noise level, the same for all estimators. Default 100.
     pub runs: usize,
-    /// Seed of excitation, noise and starts. Default 1.
+    /// Seed of the excitation, the noise and the start values. Default 1.
     pub seed: u64,
 }
 
@@ -138,17 +138,17 @@ impl Default for BenchmarkSettings {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkFile {
-    /// [`BENCHMARK_SCHEMA`].
+    /// Name and version of the schema: [`BENCHMARK_SCHEMA`].
     pub schema: &'static str,
     /// The settings.
     pub settings: BenchmarkSettings,
     /// Parameters of the noise levels.
     pub noise_levels: Vec<NoiseLevel>,
-    /// Samples per second of a record.
+    /// Samples per second of a recording.
     pub rate_hz: f64,
-    /// Length of a record.
+    /// Length of a recording, s.
     pub duration_s: f64,
-    /// Harmonics of the excitation.
+    /// Number of harmonics of the excitation.
     pub harmonics: usize,
     /// Description of the data.
     pub note: &'static str,
@@ -216,7 +216,7 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
             let runs: Vec<Run> = (0..settings.runs)
                 .into_par_iter()
                 .map(|run| {
-                    // One generator per run, so that the order of threads does not matter.
+                    // One random number generator per run, so that the order of threads does not matter.
                     let place = format!("{} {} {run}", robot.name, level.name);
                     let mut random = Random::new(settings.seed ^ hash(place.as_bytes()));
                     let mut of_prior = Random::new(settings.seed ^ hash(format!("{place} prior").as_bytes()));
@@ -290,7 +290,7 @@ fn one_run(
         .collect())
 }
 
-/// FNV-1a: a seed from text, the same on every computer.
+/// FNV-1a hash: a seed from text, the same on every computer.
 fn hash(bytes: &[u8]) -> u64 {
     let mut hasher = FnvHasher::default();
     hasher.write(bytes);

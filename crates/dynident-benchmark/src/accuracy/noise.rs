@@ -10,11 +10,12 @@ pub struct NoiseLevel {
     pub name: &'static str,
     /// Standard deviation of a position's white noise, degrees.
     pub position_std_deg: f64,
-    /// Encoder steps per turn of the joint; `None` for an ideal encoder.
+    /// Encoder counts per turn of the joint; `None` for an ideal encoder.
     pub encoder_steps: Option<u32>,
     /// Standard deviation of a torque's noise, Nm.
     pub torque_std_nm: f64,
-    /// Lag-1 correlation of a torque's noise at 1 kHz: AR(1), 0 for white noise.
+    /// Correlation of a torque's noise at successive samples (1 kHz), a first-order autoregression; 0 for white
+    /// noise.
     pub torque_correlation: f64,
     /// Share of torque samples with an outlier.
     pub outlier_share: f64,

@@ -1,21 +1,21 @@
-//! The pipeline from a record to a motion, in memory.
+//! The pipeline from a recording to a motion, in memory.
 
 use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record};
 use dynident_recording::{Derivatives, DifferentiatorSettings, FilterError, MotionBlock, cutoff};
 
-/// The record's motion by the default differentiator with the automatic cut-off, and that cut-off.
+/// Motion of the recording by the default differentiator with the automatic cut-off, and that cut-off.
 pub(super) fn motion(record: &Record) -> Result<(MotionBlock, f64), FilterError> {
     let positions: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
     let cutoff_hz = cutoff(&positions, RATE_HZ).cutoff_hz;
     differentiated(record, cutoff_hz).map(|block| (block, cutoff_hz))
 }
 
-/// The record's motion by the default differentiator with the given cut-off.
+/// Motion of the recording by the default differentiator with the given cut-off.
 pub(super) fn differentiated(record: &Record, cutoff_hz: f64) -> Result<MotionBlock, FilterError> {
     differentiated_by(&DifferentiatorSettings::default(), record, cutoff_hz)
 }
 
-/// The record's motion by a Fourier series at the excitation's frequencies, fitted to the positions.
+/// Motion of the recording as a Fourier series at the frequencies of the excitation, fitted to the positions.
 pub(super) fn periodic(record: &Record) -> Result<MotionBlock, FilterError> {
     let settings = DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: HARMONICS, trend: false };
     differentiated_by(&settings, record, 1.0)

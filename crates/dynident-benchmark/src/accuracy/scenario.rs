@@ -19,41 +19,42 @@ use nalgebra::DMatrix;
 
 /// Samples per second of a recording.
 pub const RATE_HZ: f64 = 1000.0;
-/// Length of a recording.
+/// Length of a recording, s.
 pub const DURATION_S: f64 = 10.0;
-/// Harmonics of the excitation, of 0.1 Hz each.
+/// Number of harmonics of the excitation, 0.1 Hz apart.
 pub const HARMONICS: usize = 20;
 /// Frequencies of the excitation, which are known.
 pub(super) const SERIES: FourierSeries = FourierSeries { period_s: DURATION_S, harmonics: HARMONICS };
 /// Number of random trajectories, of which the most informative one is used.
 const CANDIDATES: usize = 24;
-/// Rate at which candidates are compared.
+/// Sampling rate at which candidates are compared, Hz.
 const CANDIDATE_RATE_HZ: f64 = 20.0;
-/// ε of the tracking error, s.
+/// ε of the tracking error in the module documentation, s.
 const TRACKING_LAG_S: f64 = 0.005;
-/// Speed at which Coulomb friction has reached 76 %: the default of a study.
+/// Speed at which the smoothed Coulomb friction reaches 76 % of its final value, rad/s or m/s: the default of a
+/// study.
 const COULOMB_WIDTH: f64 = 0.02;
 /// Speed limit of joints without limits, so that the excitation is finite.
 const SPEED_RAD_S: f64 = 2.0;
 
-/// A robot, its excitation, and their true values.
+/// A robot, its excitation, and its true parameters.
 #[derive(Debug)]
 pub struct Scenario {
     /// The robot's name.
     pub robot: &'static str,
     /// The robot.
     pub model: RegressorModel,
-    /// The commanded motion.
+    /// Commanded motion.
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
     pub(super) motion: Motion,
     pub(super) torque: Vec<f64>,
 }
 
-/// Simulated encoder and torque signals of one run, joint-major.
+/// Simulated encoder and torque signals of one run, joint by joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// Samples per joint.
+    /// Number of samples per joint.
     pub samples: usize,
     /// Positions, rad.
     pub q: Vec<f64>,
@@ -119,7 +120,7 @@ impl Scenario {
         Record { samples, q, tau }
     }
 
-    /// Nominal model: bodies with a wrong density, no drives.
+    /// Nominal model: bodies with a wrong density, without drives and friction.
     pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
         let mut prior = self.model.model().parameter_vector();
         for body in prior.chunks_exact_mut(10) {
@@ -176,7 +177,7 @@ impl Scenario {
 /// drive inertia of 20 %, an offset of 3 %.
 fn drive_value(term: &TorqueTerm, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
-    // Unloaded joints (a last link about its own axis) also have friction.
+    // Joints without torque of the bodies (a last link about its own axis) also have friction.
     let torque = rms(bodies).max(0.5);
     match term.action() {
         TermAction::Damping { .. } => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
@@ -213,8 +214,8 @@ fn followed(reference: &Motion) -> Motion {
     Motion { samples: reference.samples, joints: reference.joints, q, dq, ddq, dddq: reference.dddq.clone() }
 }
 
-/// The random Fourier series with the largest `log det` of its information among several: not optimised, but not worse
-/// than a user's excitation.
+/// The random Fourier series with the largest `log det` of its information matrix among several: not optimised, but
+/// not worse than the excitation of a usual user.
 fn excitation(
     robot: &BenchmarkRobot,
     model: &Model,

@@ -17,11 +17,11 @@ pub struct Trial<'a> {
     pub scenario: &'a Scenario,
     /// Signals of encoders and torque sensors.
     pub record: &'a Record,
-    /// The record's motion by the pipeline's automatic cut-off and differentiator.
+    /// Motion of the recording by the default differentiator with the automatic cut-off.
     pub motion: &'a MotionBlock,
-    /// The automatic cut-off.
+    /// Automatic cut-off, Hz.
     pub cutoff_hz: f64,
-    /// The pipeline's filtered rows.
+    /// Rows of the regression, filtered as in `identify`.
     pub rows: &'a Rows<'a>,
     /// Start of an iterative estimator: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
@@ -34,7 +34,7 @@ pub struct Trial<'a> {
 /// The result of an estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The base parameters.
+    /// Values of the base parameters.
     pub values: Vec<f64>,
     /// Half-width of each value's 95 % interval; `None` if the estimator gives no error bars.
     pub half_width_95: Option<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! Cramér-Rao bound of a case for known laws, lag and noise, and unknown motion.
+//! Cramér-Rao bound of a case for known friction laws, lag and noise, and unknown motion.
 
 use super::cases::DefaultCase;
 use super::simulated::{Simulated, colour};
@@ -8,11 +8,13 @@ use dynident_estimation::{ChannelNoise, EstimationError, SimultaneousModel, simu
 use dynident_excitation::Motion;
 use dynident_identification::estimators::{FourierSeries, PeriodicModel, PeriodicRecord};
 
-/// Sampling rate for a period of white noise, Hz; more samples only scale the information.
+/// Sampling rate with which one period of a recording with white noise is evaluated, Hz; more samples only scale the
+/// information.
 const RATE_HZ: f64 = 250.0;
 
-/// Lower bound of the base parameters' standard deviations for unbiased estimators, with a Fourier series with unknown
-/// coefficients as motion; `None` for friction with memory. Computed for one period and scaled to all.
+/// Cramér-Rao bound of the base parameters' standard deviations for unbiased estimators, with the motion as a Fourier
+/// series with unknown coefficients; `None` for load-dependent friction. Computed for one period and scaled to all
+/// periods.
 pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f64>>, EstimationError> {
     if made.regressor.needs_load() {
         return Ok(None);
@@ -30,7 +32,7 @@ pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f
     let mut model = PeriodicModel::new(&made.regressor, &record, series, 1);
     let motion = model.fitted_motion().ok_or(EstimationError::Empty)?;
     let rows = model.linearised(&motion, &made.theta)?;
-    // Number of samples per used sample.
+    // Number of recorded samples per evaluated sample.
     let more = (thinning as f64 * case.motion.duration_s / PERIOD_S).sqrt();
     let correlation = colour(case);
     // Quantisation error of an encoder: uniform distribution.

@@ -6,7 +6,7 @@ use crate::simulated_logs::{PANDA, PLANAR, SimulatedRobot, UR10};
 /// Settings of a designed motion.
 #[derive(Clone, Copy, Debug)]
 pub struct CaseMotion {
-    /// Harmonics of 0.1 Hz.
+    /// Number of harmonics, 0.1 Hz apart.
     pub harmonics: usize,
     /// Length, s.
     pub duration_s: f64,
@@ -19,13 +19,13 @@ pub struct CaseMotion {
 pub struct CaseNoise {
     /// Standard deviation of the positions' white noise, rad.
     pub position_rad: f64,
-    /// Encoder steps per turn, as a power of two; `None` for an ideal encoder.
+    /// Bits of the encoder per turn; `None` for an ideal encoder.
     pub encoder_bits: Option<i32>,
-    /// Standard deviation of a torque's noise relative to the torque's RMS.
+    /// Standard deviation of a torque's noise relative to the RMS of the torque.
     pub torque: f64,
-    /// Correlation time (1/e) of the torque's noise, s; 0 for white noise.
+    /// Time in which the correlation of the torque's noise decays to 1/e, s; 0 for white noise.
     pub torque_colour_s: f64,
-    /// Share of the torque's samples with an outlier of twenty standard deviations, either sign.
+    /// Share of the torque samples that have an outlier of twenty standard deviations, with either sign.
     pub outlier_share: f64,
 }
 
@@ -39,7 +39,7 @@ pub enum CaseFriction {
 }
 
 impl CaseFriction {
-    /// The law of a joint.
+    /// Friction law of a joint.
     pub fn of(self, joint: usize) -> FrictionTruth {
         match self {
             Self::All(truth) => truth,
@@ -61,9 +61,9 @@ impl CaseFriction {
 pub struct DefaultCase {
     /// The robot.
     pub robot: SimulatedRobot,
-    /// Its motion.
+    /// Settings of the robot's motion.
     pub motion: CaseMotion,
-    /// Its friction.
+    /// True friction of the robot.
     pub friction: CaseFriction,
     /// Sensor noise.
     pub noise: CaseNoise,
@@ -72,7 +72,7 @@ pub struct DefaultCase {
 }
 
 impl DefaultCase {
-    /// All settings in a line: the name in messages, and the seed of the random numbers.
+    /// All settings in one line. It is the name of the case in messages, and the seed of its random numbers.
     pub fn label(&self) -> String {
         let Self { robot, motion, friction, noise, lag_s } = self;
         format!(

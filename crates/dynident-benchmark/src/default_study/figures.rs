@@ -3,17 +3,17 @@
 use super::fits::{CUTOFF_MULTIPLES, NamedEstimator};
 use core::iter::Sum;
 
-/// Coverage of 95 % intervals.
+/// How many 95 % intervals contain the true value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Covered {
-    /// Intervals that contain the truth.
+    /// Number of intervals that contain the true value.
     pub inside: usize,
-    /// All intervals.
+    /// Number of all intervals.
     pub all: usize,
 }
 
 impl Covered {
-    /// Coverage in percent; `None` without intervals.
+    /// Percentage of the intervals that contain the true value; `None` without intervals.
     pub fn percent(self) -> Option<f64> {
         (self.all > 0).then(|| 100.0 * self.inside as f64 / self.all as f64)
     }
@@ -26,14 +26,14 @@ impl Sum for Covered {
     }
 }
 
-/// Results of one estimator by name.
+/// Results of one of the estimators that are compared by name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorOfName {
-    /// Its RMS error over the runs in which it converged, as a share.
+    /// RMS error over the runs in which it converged, relative to the standard deviation of the torque.
     pub error: f64,
-    /// Error of the default's estimate in the same runs.
+    /// Error of the default settings in the same runs, without the conditions of physical consistency.
     pub of_default: f64,
-    /// Runs in which it converged.
+    /// Number of runs in which it converged.
     pub settled: usize,
 }
 
@@ -49,9 +49,9 @@ pub(super) enum NamedRun {
 pub(super) struct RunFigures {
     pub(super) written: f64,
     pub(super) free: f64,
-    /// Error of the written model with the true laws and defaults for everything else.
+    /// Error of the written model with the true friction laws and default settings for everything else.
     pub(super) laws_stated: f64,
-    /// Errors with the true laws and lag for each cut-off; infinite for impossible filters.
+    /// Errors with the true friction laws and the true lag for each cut-off; infinite for impossible filters.
     pub(super) with_truth: [f64; CUTOFF_MULTIPLES.len()],
     pub(super) plain: Option<f64>,
     pub(super) plain_weighted: Option<f64>,
@@ -70,66 +70,72 @@ pub(super) struct RunFigures {
     pub(super) asked_hz: f64,
 }
 
-/// Results of one case; errors are RMS values over its runs, as shares.
+/// Torque errors of one case, RMS over its runs, relative to the standard deviation of the torque.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseFigures {
     /// Number of recordings.
     pub runs: usize,
-    /// Error of the model that the default study writes (physically consistent).
+    /// Error of the physically consistent model that a study with default settings writes.
     pub of_default: f64,
-    /// Error of the default's estimate.
+    /// Error of the default settings' estimate without the conditions of physical consistency.
     pub of_default_free: f64,
-    /// Error of the written model with the true laws and defaults for everything else.
+    /// Error of the written model with the true friction laws and default settings for everything else.
     pub of_laws_stated: f64,
-    /// Error of the written model with true laws, true lag and best cut-off.
+    /// Error of the written model with the true friction laws, the true lag and the best cut-off.
     pub of_best: f64,
-    /// Error of the estimate with true laws, true lag and best cut-off.
+    /// Error of the estimate without the conditions of physical consistency, with the true friction laws, the true lag
+    /// and the best cut-off.
     pub of_best_free: f64,
-    /// Best cut-off in units of that from the spectra.
+    /// Best cut-off relative to that from the position spectra.
     pub best_multiple: f64,
-    /// Default cut-off in these units, geometric mean.
+    /// Default cut-off relative to that from the position spectra, geometric mean over the runs.
     pub default_multiple: f64,
-    /// Error of plain least squares; `None` if it failed in some run.
+    /// Error of ordinary least squares with viscous and Coulomb friction; `None` if it failed in any run.
     pub of_plain: Option<f64>,
-    /// The same with weights by joint noise.
+    /// Error of the same fit with weights from the noise of each joint.
     pub of_plain_weighted: Option<f64>,
-    /// Errors of estimators by name, in the order of [`NamedEstimator::ALL`]; `None` if not computed.
+    /// Results of the estimators compared by name, in the order of [`NamedEstimator::ALL`]; `None` if not computed.
     pub by_name: Vec<Option<ErrorOfName>>,
     /// RMS over bodies' base parameters and runs of the default's error relative to the Cramér-Rao bound for unknown
     /// motion and known laws, noise and lag; `None` for load-dependent friction.
     pub over_bound: Option<f64>,
-    /// Coverage of the default's intervals of bodies' base parameters.
+    /// Coverage of the 95 % intervals of the bodies' base parameters with default settings.
     pub bodies: Covered,
-    /// Coverage of the default's friction intervals for joints whose laws were all selected correctly.
+    /// Coverage of the 95 % intervals of friction with default settings, for joints whose friction laws were all
+    /// selected correctly.
     pub friction: Covered,
-    /// Number of joints, over all runs, whose law the recordings can distinguish.
+    /// Number of joints, over all runs, whose friction law can be distinguished from simpler ones with these
+    /// recordings.
     pub tellable: usize,
-    /// Number of these joints for which the law was selected.
+    /// Number of these joints for which the true law was selected.
     pub told: usize,
-    /// Number of joints, over all runs, whose true friction has neither memory nor load.
+    /// Number of joints, over all runs, whose true friction has neither hysteresis nor a part that depends on the
+    /// transmitted torque.
     pub without_need: usize,
-    /// Number of these joints for which a law with memory or under load was selected.
+    /// Number of these joints for which a law with hysteresis or with such a part was selected.
     pub unneeded: usize,
-    /// Estimated lag, mean over the runs, s.
+    /// Estimated lag of the torque, mean over the runs, s.
     pub lag_found_s: Option<f64>,
-    /// Runs in which the 95 % interval of the lag contains the truth.
+    /// Number of runs in which the 95 % interval of the lag contains the true lag.
     pub lag_held: usize,
-    /// Runs in which the default used instrumental variables.
+    /// Number of runs in which the default settings used instrumental variables.
     pub instruments: usize,
 }
 
 impl CaseFigures {
-    /// Error of the default's written model relative to the best one.
+    /// Ratio of the error with default settings to that of the best written model.
     pub fn over_best(&self) -> f64 {
         self.of_default / self.of_best
     }
 
-    /// Cost of selecting the laws: error of the default relative to that with the true laws.
+    /// Ratio of the error with default settings to that with the true friction laws: the effect of selecting the
+    /// laws.
     pub fn over_laws_stated(&self) -> f64 {
         self.of_default / self.of_laws_stated
     }
 
-    /// Cost of cut-off and lag: error with the true laws and defaults for everything else, relative to the best.
+    /// Ratio of the error with the true friction laws and default settings to that of the best written model: the
+    /// effect of cut-off and lag.
     pub fn laws_stated_over_best(&self) -> f64 {
         self.of_laws_stated / self.of_best
     }

@@ -1,4 +1,5 @@
-//! The compared fits: default, with true laws and lag, plain, and each estimator by name.
+//! The compared fits: with default settings, with the true friction laws and lag, with plain least squares, and with
+//! each estimator by name.
 
 use super::cases::DefaultCase;
 use super::simulated::{CaseRobot, Simulated};
@@ -13,14 +14,14 @@ use dynident_identification::{
 };
 use dynident_recording::log::OneOrMany;
 
-/// Cut-offs for the fits with true laws and lag, in units of that from the spectra.
+/// Cut-offs for the fits with the true friction laws and lag, relative to that from the position spectra.
 pub(super) const CUTOFF_MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
 /// Maximum cut-off relative to the sampling rate.
 const MAX_CUTOFF_OVER_RATE: f64 = 0.45;
 /// Maximum number of samples of all joints for estimators that also estimate the motion.
 const MAX_SAMPLES_FOR_MOTION: f64 = 75_000.0;
 
-/// Settings of `identify` for a study of this robot with files and columns only.
+/// Settings of `identify` for a study of this robot that only names its files and columns.
 pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
     let mut settings = with_friction_stated();
     settings.friction = usual_searches(robot.model()).into();
@@ -28,7 +29,7 @@ pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
     settings
 }
 
-/// As [`default_settings`] with friction and drives given by keys.
+/// Like [`default_settings`], but with friction and drives given in the study.
 fn with_friction_stated() -> IdentificationSettings {
     let mut settings = IdentificationSettings::default();
     settings.estimation.estimator = Estimator::Auto(InstrumentSettings::default());
@@ -36,18 +37,19 @@ fn with_friction_stated() -> IdentificationSettings {
 }
 
 impl Simulated {
-    /// Default fit, as in a study without keys. The set-up check, which does not change the model, is disabled.
+    /// Fit with default settings. The check of the set-up, which does not change the model, is disabled.
     pub(super) fn by_default(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
         let settings = default_settings(&robot.described);
         self.fit(&robot.described, settings)
     }
 
-    /// Default fit with the true laws and their constants.
+    /// Fit with default settings, but with the true friction laws and their constants.
     pub(super) fn with_laws_stated(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
         self.fit(&robot.with_true_laws, with_friction_stated())
     }
 
-    /// Fit with the true laws, their constants, the true lag and a given cut-off; `None` for an impossible filter.
+    /// Fit with the true friction laws, their constants, the true lag and a given cut-off; `None` for an impossible
+    /// filter.
     pub(super) fn with_truth(
         &self,
         case: &DefaultCase,
@@ -65,8 +67,8 @@ impl Simulated {
         self.fit(&robot.with_true_laws, settings).ok()
     }
 
-    /// Plain least squares: viscous and smooth Coulomb friction, the default cut-off for these, torque as logged; with
-    /// `Estimator::Ordinary` all joints have the same weight.
+    /// Plain least squares: viscous and smoothed Coulomb friction, the default cut-off of these laws, and the torque
+    /// as logged. With `Estimator::Ordinary` all joints have the same weight.
     pub(super) fn plain(&self, robot: &CaseRobot, estimator: Estimator) -> Option<Identification> {
         let mut settings = IdentificationSettings::default();
         settings.motion.torque_lag_s = Some(OneOrMany::One(0.0));
@@ -75,8 +77,8 @@ impl Simulated {
         self.fit(&robot.described, settings).ok()
     }
 
-    /// Error of another estimator with the filter, friction and lag of the default fit; `None` if it fails, does not
-    /// converge, or is not applicable.
+    /// Error of another estimator with the filter, the friction and the lag of the fit with default settings; `None`
+    /// if it fails, does not converge, or is not applicable.
     pub(super) fn by_name(&self, robot: &CaseRobot, found: &Identification, estimator: Estimator) -> Option<f64> {
         let robot = robot.described.with_terms(found.model().terms().to_vec()).ok()?;
         let mut settings = IdentificationSettings::default();
@@ -106,7 +108,7 @@ impl Simulated {
         self.error(found.model(), found.base_values())
     }
 
-    /// Error of the written model: the physically consistent one if available.
+    /// Error of the model that `identify` writes: the physically consistent one if available.
     pub(super) fn written_error(&self, found: &Identification) -> f64 {
         let theta = found.consistent_base_values().unwrap_or_else(|| found.base_values());
         let model: &RegressorModel = found.model();
@@ -114,7 +116,7 @@ impl Simulated {
     }
 }
 
-/// Estimators compared by name.
+/// Estimators that are compared by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NamedEstimator {
     /// Ordinary least squares.
@@ -123,17 +125,17 @@ pub enum NamedEstimator {
     Weighted,
     /// Generalised least squares.
     Generalized,
-    /// Huber's weights.
+    /// Least squares with Huber's weights.
     Huber,
-    /// Tukey's weights.
+    /// Least squares with Tukey's weights.
     Tukey,
-    /// Weights from the local noise.
+    /// Least squares with weights from the local noise.
     NoiseWeighted,
-    /// Instruments from the logs' motion.
+    /// Instrumental variables from the motion of the logs.
     Instrumental,
-    /// Motion and parameters together, with a spline motion.
+    /// Motion and parameters estimated together, with splines as motion.
     Simultaneous,
-    /// Motion and parameters together, with a Fourier series of known period.
+    /// Motion and parameters estimated together, with a Fourier series of known period as motion.
     SimultaneousSeries,
 }
 
@@ -166,7 +168,7 @@ impl NamedEstimator {
         }
     }
 
-    /// The estimator for a case; `None` if it is would take minutes.
+    /// The estimator for a case; `None` if it would take minutes.
     pub(super) fn of(self, case: &DefaultCase, dof: usize) -> Option<Estimator> {
         let samples = case.motion.duration_s * case.motion.rate_hz * dof as f64;
         let periods = PeriodSettings { period_s: Some(PERIOD_S), ..PeriodSettings::default() };

@@ -1,5 +1,5 @@
-//! **Quality of the defaults**: a study with files and columns only, compared with the best possible one, with plain
-//! least squares and with each estimator by name: robots × motions × friction × noise × lag.
+//! **Quality of the defaults.** A study that only names its files and columns is compared with the best possible one,
+//! with plain least squares and with each estimator by name, for robots × motions × friction × noise × lag.
 //!
 //! In every run the robot's bodies differ from the robot description, the motion is designed for it, the exact torque
 //! with friction is delayed by some milliseconds, and both have noise. The error of a model is that of its torque on
@@ -96,7 +96,7 @@ fn run_figures(
         tellable[*joint]
             && terms_of(*joint).is_some_and(|terms| terms.iter().any(|term| truth.is_distinguished_by(term)))
     };
-    // No truth has memory.
+    // No true friction has hysteresis.
     let needs_load = |joint: usize| case.friction.of(joint).terms(joint).iter().any(TorqueTerm::needs_load);
     let is_unneeded = |joint: usize| {
         let terms = terms_of(joint).unwrap_or_default();
@@ -138,14 +138,14 @@ fn run_figures(
     })
 }
 
-/// Positions of the bodies' base parameters in a fit, with their true values.
+/// Indices of the bodies' base parameters in a fit, with their true values.
 fn bodies<'a>(made: &'a Simulated, found: &'a Identification) -> impl Iterator<Item = (usize, f64)> + 'a {
     let columns = found.model().layout().columns().iter().enumerate();
     let bodies = columns.filter(|(_, column)| matches!(column, Column::Body { .. }));
     bodies.filter_map(|(place, column)| Some((place, made.true_value(column)?)))
 }
 
-/// Positions of the friction parameters of joints whose laws are all correct, with their true values.
+/// Indices of the friction parameters of joints whose laws were all selected correctly, with their true values.
 fn frictions(case: &DefaultCase, made: &Simulated, found: &Identification, dof: usize) -> Vec<(usize, f64)> {
     let columns = found.model().layout().columns();
     let of_joint = |joint: usize| {

@@ -21,13 +21,13 @@ use std::hash::Hasher;
 
 /// Number of random series, of which the most informative one is used.
 const CANDIDATES: usize = 24;
-/// Rate at which they are compared.
+/// Sampling rate at which they are compared, Hz.
 const CANDIDATE_RATE_HZ: f64 = 20.0;
-/// Rate of the motion on which models are tested.
+/// Sampling rate of the motion on which models are tested, Hz.
 const TEST_RATE_HZ: f64 = 100.0;
 /// Maximum relative deviation of a body's mass from the robot description.
 const MAX_MASS_DEVIATION: f64 = 0.25;
-/// Maximum deviation of a body's position, m (each axis).
+/// Maximum shift of a body from its place in the robot description, m (each axis).
 const MAX_POSITION_DEVIATION_M: f64 = 0.02;
 const OUTLIER_STD: f64 = 20.0;
 
@@ -51,11 +51,11 @@ impl CaseRobot {
 }
 
 pub(super) struct Simulated {
-    /// The true robot, including the load for its friction.
+    /// The true robot, with the torque that its friction depends on.
     pub(super) regressor: RegressorModel,
     pub(super) theta: Vec<f64>,
     pub(super) log: Log,
-    /// Cut-off from the positions' spectra, Hz.
+    /// Cut-off from the position spectra, Hz.
     pub(super) asked_hz: f64,
     pub(super) motion: Motion,
     pub(super) torque_std: Vec<f64>,
@@ -73,7 +73,7 @@ impl Simulated {
         let laws = robot.with_true_laws.terms().to_vec();
         let regressor = ParametricModel::new(arm, laws).map_err(|source| source.to_string())?;
         let regressor = RegressorModel::from(regressor);
-        // The load is that of the bodies only.
+        // The transmitted torque is that of the bodies only.
         let mut bodies = regressor.model().parameter_vector();
         bodies.resize(bodies.len() + regressor.terms().len(), 0.0);
         let load = regressor.base().values(&bodies);
@@ -105,7 +105,7 @@ impl Simulated {
         Ok(Self { regressor, theta, log, asked_hz, motion, torque_std, exact, other, other_exact })
     }
 
-    /// Error of a model's torque on the test motion, as a share.
+    /// Error of a model's torque on the test motion, relative to the standard deviation of the torque.
     pub(super) fn error(&self, model: &RegressorModel, theta: &[f64]) -> f64 {
         model_error(&self.other, &self.other_exact, &torque(model, &self.other, theta))
     }
@@ -117,8 +117,8 @@ impl Simulated {
         place.map(|place| self.theta[place])
     }
 
-    /// Joints whose friction law is distinguishable from viscous and Coulomb friction (for plain friction: from
-    /// viscous friction alone): the residual of the best fit without it exceeds the noise.
+    /// Joints whose friction law can be distinguished from viscous and Coulomb friction (for a joint with only these:
+    /// from viscous friction alone), because the residual of the best fit without the law exceeds the noise.
     pub(super) fn tellable(&self, case: &DefaultCase, robot: &CaseRobot) -> Result<Vec<bool>, EstimationError> {
         let is_left = |term: &&TorqueTerm| {
             term.own_joint().is_none_or(|joint| {
@@ -138,7 +138,7 @@ impl Simulated {
     }
 }
 
-/// Lag-1 correlation of the torque's noise.
+/// Correlation of the torque's noise at successive samples.
 pub(super) fn colour(case: &DefaultCase) -> f64 {
     let (colour_s, step_s) = (case.noise.torque_colour_s, case.motion.rate_hz.recip());
     if colour_s > 0.0 { (-step_s / colour_s).exp() } else { 0.0 }
@@ -155,8 +155,8 @@ fn true_bodies(described: &Model, random: &mut Random) -> Vec<InertialParameters
     described.inertials().iter().map(|body| off(body, random)).collect()
 }
 
-/// The random series with the largest determinant of its information among several: not optimised, but not an unlucky
-/// choice.
+/// The random Fourier series with the largest determinant of its information matrix among several: not optimised, but
+/// not an unlucky choice.
 fn designed(
     model: &Model,
     robot: &ParametricModel,
@@ -217,7 +217,7 @@ fn measured(case: &DefaultCase, exact: &[f64], std: f64, random: &mut Random) ->
     exact.iter().map(&mut of).collect()
 }
 
-/// FNV-1a: a seed from text, the same on every computer.
+/// FNV-1a hash: a seed from text, the same on every computer.
 fn seed(words: &str) -> u64 {
     let mut hasher = FnvHasher::default();
     hasher.write(words.as_bytes());

@@ -5,18 +5,19 @@ use super::figures::{CaseFigures, Covered};
 use super::fits::NamedEstimator;
 use core::fmt::Write;
 
-/// Goal for the cost of all defaults, and of cut-off and lag: error (for the latter with the true laws) relative to
-/// that of the best cut-off with true laws and lag.
+/// Goal for the ratio of the error with default settings to that with the best cut-off and the true friction laws and
+/// lag; also for the same ratio with the true laws and default settings for everything else.
 const MAX_ERROR_OVER_BEST: f64 = 1.15;
-/// Goal for the cost of selecting the laws: the default's error relative to that with the true laws.
+/// Goal for the ratio of the error with default settings to that with the true friction laws.
 const MAX_ERROR_OVER_TRUE_LAWS: f64 = 1.3;
-/// Goal for the error relative to the Cramér-Rao bound.
+/// Goal for the ratio of the error to the Cramér-Rao bound.
 const MAX_ERROR_OVER_BOUND: f64 = 1.2;
 /// Goal for the coverage of the 95 % intervals, percent.
 const COVERAGE_PERCENT: [f64; 2] = [93.0, 97.0];
-/// Goal for the share of joints with friction under load or with memory although the truth has none, percent.
+/// Goal for the share of joints for which load-dependent friction or friction with hysteresis is selected although
+/// the true friction has none, percent.
 const MAX_UNNEEDED_LAWS_PERCENT: f64 = 2.0;
-/// Goal for the share of distinguishable joints with a correct law, percent.
+/// Goal for the share of distinguishable joints for which the true law is selected, percent.
 const MIN_CORRECT_LAWS_PERCENT: f64 = 90.0;
 
 /// Columns of [`csv_line`], followed for each estimator by its error in percent and the runs in which it converged.

@@ -25,7 +25,7 @@ pub(crate) struct Report<'a> {
     pub(crate) robot: &'a str,
     pub(crate) dof: usize,
     pub(crate) level: Level,
-    /// Only these quantities, or all if empty.
+    /// Measure only these quantities, or all if empty.
     pub(crate) only: &'a [String],
 }
 
@@ -62,7 +62,7 @@ impl Report<'_> {
     }
 }
 
-/// One line about the computer. Without an `algo` it is not a result.
+/// One line about the computer. It has no key `algo`, because it is not a result.
 pub(crate) fn environment(levels: &[Level]) -> String {
     let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let processor = processor.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

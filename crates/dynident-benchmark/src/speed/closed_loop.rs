@@ -1,4 +1,4 @@
-//! A step of the closed loop: controller, friction-free arm, record.
+//! A step of the closed loop: controller, arm without friction, recording.
 
 use super::clock::Report;
 use dynident_dynamics::{Workspace, mass_matrix};
@@ -18,9 +18,10 @@ const SAMPLES: usize = 5000;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
-/// Times one step of 1 ms under joint PD control to zero (gains 100 and 20 times the mass matrix' diagonal at zero)
-/// for both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along
-/// sines, at the best level of this processor.
+/// Times one step of 1 ms with joint PD control to zero positions (gains: 100 and 20 times the diagonal of the mass
+/// matrix at zero) for both fixed-step integrators; the same with dry friction; and 10 s of the finite-time
+/// controller of the paper *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* at 1 kHz
+/// along sines. It uses the best instruction set of this processor.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), SimulationError> {
     let dof = model.dof();
     let zeros = vec![0.0; dof];
@@ -35,14 +36,14 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     let start = Start::At { q: (0..dof).map(|_| random.uniform(-0.3, 0.3)).collect(), dq: zeros.clone() };
     for (quantity, integrator) in [("pd_step_euler", EULER), ("pd_step_rk4", RK4)] {
         let settings = LoopSettings { integrator, start: start.clone(), ..LoopSettings::default() };
-        // The first run reports errors.
+        // The first run only reports errors; it is not timed.
         closed_loop(&mut plant, controller.as_mut(), &reference, &settings)?;
         report.time(quantity, SAMPLES, || {
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
-    // Dry friction in every joint, in Nm equal to the mass matrix' diagonal at zero in kg m²: some joints stick, some
-    // slide.
+    // Dry friction in every joint, in Nm equal to the diagonal of the mass matrix at zero in kg m², so that some
+    // joints stick and some slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
     let terms: Vec<TorqueTerm> = (0..dof).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape })).collect();
     let mut rough = Plant::new(model, &terms, &scaled(1.0))?;

@@ -17,7 +17,8 @@ const SAMPLES: usize = 10_000;
 /// number of cache lines.
 const BLOCK: usize = 248;
 
-/// Times both for 10,000 samples of a smooth motion; torques are computed beforehand, as in the Python program.
+/// Times both for 10,000 samples of a smooth motion. Torques are computed beforehand, as in the compared Python
+/// program.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), EstimationError> {
     let blocks = Motion::fourier(model, SAMPLES, 10.0).blocks(BLOCK);
     let mut workspace = BatchWorkspace::with_level(model, report.level);

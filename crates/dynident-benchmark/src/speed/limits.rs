@@ -71,7 +71,8 @@ fn chains<const N: usize>(level: Level) -> f64 {
     (2 * N * steps * level.lanes()) as f64 / seconds
 }
 
-/// Bytes read and written, without the reads before writing.
+/// Measures the memory bandwidth from the bytes read and written by the program, without the reads of the processor
+/// before writing.
 fn memory() {
     let (from, more) = (vec![1.0; MEMORY_ARRAY_LEN], vec![2.0; MEMORY_ARRAY_LEN]);
     let mut to = vec![0.0; MEMORY_ARRAY_LEN];
@@ -110,7 +111,7 @@ pub(crate) fn of_text(path: &Path) -> std::io::Result<()> {
     );
     let text = std::fs::read_to_string(path)?;
     let (header, rows) = text.split_once('\n').unwrap_or_default();
-    // A tenth of the text is sufficient.
+    // A tenth of the text is sufficient for parsing.
     let some: Vec<&str> = rows.lines().take(rows.len() / header.len().max(1) / 30).collect();
     let fields: Vec<&str> = some.iter().flat_map(|line| line.split(',')).collect();
     let length: usize = fields.iter().map(|field| field.len() + 1).sum();

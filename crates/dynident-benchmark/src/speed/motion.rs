@@ -7,7 +7,8 @@ use dynident_model::sample::Random;
 /// States in one sweep: enough to defeat branch prediction.
 pub(crate) const STATES: usize = 512;
 
-/// Random samples, joint-major: positions within the limits (at most one turn), speeds and accelerations within ±1.
+/// Random samples, stored joint by joint: positions within the limits (at most one turn), speeds and accelerations
+/// within ±1.
 pub(crate) struct Motion {
     pub(crate) samples: usize,
     pub(crate) q: Vec<f64>,
@@ -52,7 +53,7 @@ impl Motion {
         motion
     }
 
-    /// The motion in blocks of at most `block` samples, each joint-major.
+    /// The motion in blocks of at most `block` samples, each stored joint by joint.
     pub(crate) fn blocks(&self, block: usize) -> Vec<Self> {
         let dof = self.q.len() / self.samples;
         let cut = |array: &[f64], start: usize, end: usize| -> Vec<f64> {

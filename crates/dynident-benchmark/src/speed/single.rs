@@ -24,7 +24,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     };
     time("rnea", &mut |w, q, dq, ddq| inverse_dynamics(model, w, q, dq, ddq)[0]);
     time("crba", &mut |w, q, _, _| mass_matrix(model, w, q)[0]);
-    // Accelerations of one in place of torques, as in the compared program: the code path is the same.
+    // Accelerations of one in place of torques, as in the compared program; the code path is the same.
     time("aba", &mut |w, q, dq, tau| forward_dynamics(model, w, q, dq, tau)[0]);
     time("joint_torque_regressor", &mut |w, q, dq, ddq| torque_regressor(model, w, q, dq, ddq)[0]);
     time("aba_derivatives", &mut |w, q, dq, tau| forward_dynamics_derivatives(model, w, q, dq, tau).by_position[0]);

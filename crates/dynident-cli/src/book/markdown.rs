@@ -1,9 +1,9 @@
-//! Markdown of the book as text for the terminal or a pipe.
+//! Converts the Markdown of the documentation pages to text for the terminal or a pipe.
 
 use comfy_table::{ContentArrangement, Table, presets};
 use core::fmt::Write;
 
-/// Narrowest text, columns.
+/// Smallest width of the text, columns.
 const MIN_WIDTH: usize = 40;
 
 /// A page as text of `width` columns: wrapped paragraphs and tables, indented code, and a list of the pages that it
@@ -57,13 +57,13 @@ fn heading(line: &str, is_styled: bool) -> String {
     if rule.is_empty() { format!("{title}\n") } else { format!("{title}\n{rule}\n") }
 }
 
-/// Name of the page in the target of a link, up to the closing bracket.
+/// Name of the page in the target of a link; `target` may continue after the closing bracket.
 fn linked_page(target: &str) -> Option<&str> {
     let file = target.split(')').next()?.split('#').next()?;
     file.strip_suffix(".md").filter(|name| !name.contains('/'))
 }
 
-/// The cells of a table row. `\|` is part of a cell.
+/// The cells of a table row; `\|` does not end a cell.
 pub(super) fn cells(row: &str) -> Vec<&str> {
     let row = row.trim().trim_start_matches('|');
     let row = row.strip_suffix('|').unwrap_or(row);
@@ -94,7 +94,8 @@ fn table(rows: &[Vec<&str>], width: usize) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Text of a line without marks: links become their text, pictures their description, bold text becomes plain.
+/// Text of a line without Markdown marks: links become their text, pictures their description, bold text becomes
+/// plain.
 pub(crate) fn inline(text: &str) -> String {
     let mut plain = String::new();
     let mut rest = text;
@@ -118,7 +119,7 @@ pub(crate) fn inline(text: &str) -> String {
     plain + rest
 }
 
-/// Words of a link or a picture at the beginning of `text`, and the text behind it.
+/// Text of a link or description of a picture at the beginning of `text`, and the text that follows it.
 fn link(text: &str) -> Option<(&str, &str)> {
     let inner = text.strip_prefix("![").or_else(|| text.strip_prefix('['))?;
     let (words, behind) = inner.split_once("](")?;
@@ -131,7 +132,7 @@ fn link(text: &str) -> Option<(&str, &str)> {
     Some((words, behind))
 }
 
-/// Code at the beginning of `text` with its backquotes, and the text behind it. Two backquotes become none.
+/// Code at the beginning of `text` with its backquotes, and the text that follows it. Double backquotes are removed.
 fn code(text: &str) -> Option<(String, &str)> {
     let (mark, inner) = match text.strip_prefix("``") {
         Some(inner) => ("``", inner),

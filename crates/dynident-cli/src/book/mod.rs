@@ -1,4 +1,5 @@
-//! The pages of the book inside the program: list, page by name or title, search, and the entry of a message's code.
+//! The documentation pages that are part of the program: their list, a page by name or title, a search, and the
+//! explanation of a message's code.
 
 mod markdown;
 
@@ -15,11 +16,11 @@ const MIN_SIMILARITY: f64 = 0.75;
 /// Largest number of proposed names.
 const MAX_PROPOSED: usize = 4;
 
-/// A page.
+/// A page of the documentation.
 pub(crate) struct Page {
-    /// Name of the file without its ending.
+    /// Name of the file without `.md`.
     pub(crate) name: String,
-    /// Markdown.
+    /// Markdown of the page.
     pub(crate) text: String,
 }
 
@@ -29,19 +30,19 @@ pub(crate) struct Entry<'a> {
     pub(crate) message: &'a str,
     /// Cause and fix.
     pub(crate) reason: &'a str,
-    /// Heading of its section, and the text before the table.
+    /// Heading of its section, and the text of the section before the table.
     pub(crate) section: &'a str,
     pub(crate) introduction: &'a str,
 }
 
-/// Addition to a sentence in a program without all pages.
+/// Text that a program without all pages appends to a sentence.
 pub(crate) const SMALL_NOTE: &str = if cfg!(feature = "book") {
     ""
 } else {
     concat!("; this package contains only the pages about messages; all pages: ", env!("CARGO_PKG_REPOSITORY"))
 };
 
-/// All pages, in the order of the book.
+/// All pages, in the order of the documentation.
 pub(crate) fn pages() -> Result<Vec<Page>, String> {
     let files = packed::files(include_bytes!(concat!(env!("OUT_DIR"), "/book.deflate")))?;
     Ok(files.into_iter().map(|file| Page { name: file.name, text: file.text }).collect())
@@ -59,8 +60,8 @@ impl Page {
         first.find(". ").map_or(first.clone(), |end| first[..=end].to_owned())
     }
 
-    /// Headings of the sections that contain all words, ignoring case; `None` if no section does and the page as a
-    /// whole does not either.
+    /// Headings of the sections that contain all words, ignoring case; empty if only the page as a whole contains
+    /// them, and `None` if it does not.
     pub(crate) fn matches(&self, words: &[String]) -> Option<Vec<String>> {
         let has_all = |text: &str| {
             let text = text.to_lowercase();
@@ -116,7 +117,7 @@ pub(crate) fn page<'a>(pages: &'a [Page], wanted: &str) -> Result<&'a Page, Stri
     ))
 }
 
-/// Finds the entry of a message's code.
+/// Finds the entry of the page "Messages" for the code of a message.
 pub(crate) fn entry<'a>(pages: &'a [Page], code: &str) -> Option<Entry<'a>> {
     let page = pages.iter().find(|page| page.name == MESSAGES)?;
     let start = format!("| `{}` |", code.to_lowercase());

@@ -16,7 +16,7 @@ use dynident::{
 };
 use std::path::PathBuf;
 
-/// The motion; not written if it was given.
+/// File of the designed trajectory; it is not written if the trajectory was given.
 const TRAJECTORY: &str = "trajectory.csv";
 const FILES: [&str; 10] = [
     "design.json",
@@ -30,13 +30,13 @@ const FILES: [&str; 10] = [
     "waypoints.csv",
     "trajectory.script",
 ];
-/// Files that not every design has.
+/// Files that only some designs have.
 const OPTIONAL_FILES: [&str; 6] =
     [TRAJECTORY, "fitness.csv", "fitness.svg", "trajectory.ros2.yaml", "waypoints.csv", "trajectory.script"];
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The study file; its [design] states the objective.
+    /// The study file; its [design] gives the objective.
     study: PathBuf,
     /// Folder for design.json, report.html, trajectory.csv, preview.svg and path.svg; for a study with [drive.servo]
     /// design.json and commands.csv.
@@ -49,7 +49,7 @@ pub(crate) struct Options {
     /// Do not search: check a log of the study, by its name or file, with a forecast for each parameter.
     #[arg(long, value_name = "NAME", conflicts_with = "seed")]
     check_log: Option<String>,
-    /// Seed of the random starts, in place of the study's.
+    /// Seed of the random starts; replaces that of the study.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Also write files for the robot; may be given several times.
@@ -59,7 +59,7 @@ pub(crate) struct Options {
     /// URScript.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
-    /// Folder of the robot description, in place of the study's own.
+    /// Folder of the robot description; replaces that of the study.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]
@@ -67,7 +67,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The first given option that a design of commands does not have.
+    /// The first given option that does not apply to a design of commands (`[drive.servo]`).
     fn only_for_torque(&self) -> Option<&'static str> {
         let given = [
             ("--check", self.check.is_some()),

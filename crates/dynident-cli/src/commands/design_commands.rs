@@ -8,12 +8,12 @@ use dynident::{
 };
 use std::path::Path;
 
-/// The commands.
+/// File of the designed commands.
 const COMMANDS: &str = "commands.csv";
 const DESIGN: &str = "design.json";
 const ROS2: &str = "commands.ros2.yaml";
 
-/// Files for robots in addition to the commands.
+/// Requested files for robots in addition to `commands.csv`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CommandForms {
     pub(super) ros2: bool,
@@ -83,7 +83,7 @@ fn files(
     Ok(files)
 }
 
-/// The LeRobot data set of positions of the joints in a design with this name, at this rate.
+/// The LeRobot data set with the joint positions of a design with this name, at this rate.
 pub(super) fn lerobot_files(
     (study, path): (&Study, &Path),
     robot: &StudyRobot,

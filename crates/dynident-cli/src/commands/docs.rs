@@ -18,11 +18,11 @@ pub(crate) struct Options {
     search: Vec<String>,
 }
 
-/// Pages of the book, as `docs --json` prints them.
+/// Output of `docs --json`: pages of the documentation.
 #[derive(Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DocsFile {
-    /// [`DOCS_SCHEMA`].
+    /// Name and version of the schema: [`DOCS_SCHEMA`].
     pub schema: String,
     /// Version of the program.
     pub version: String,
@@ -32,15 +32,15 @@ pub struct DocsFile {
     pub message: Option<DocsMessage>,
 }
 
-/// A page of the book.
+/// A page of the documentation.
 #[derive(Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DocsPage {
-    /// Name for `dynident docs NAME`.
+    /// Name of the page in `dynident docs NAME`.
     pub name: String,
-    /// Title.
+    /// Title of the page.
     pub title: String,
-    /// First sentence.
+    /// First sentence of the page.
     pub about: String,
     /// Headings of the sections that contain the words of a search; empty otherwise.
     pub headings: Vec<String>,
@@ -52,7 +52,7 @@ pub struct DocsPage {
 #[derive(Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DocsMessage {
-    /// The code.
+    /// Code of the message.
     pub code: String,
     /// The message, with placeholders in braces.
     pub message: String,
@@ -65,7 +65,7 @@ pub struct DocsMessage {
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let pages = book::pages()?;
     if !options.search.is_empty() {
-        // Quoted words are separate words, too.
+        // Words in quotation marks are searched as separate words, too.
         let words: Vec<String> =
             options.search.iter().flat_map(|words| words.split_whitespace()).map(str::to_owned).collect();
         return search(&pages, &words, context);
@@ -129,7 +129,7 @@ fn search(pages: &[Page], words: &[String], context: &Context) -> Result<Verdict
 
 fn explain(entry: &Entry<'_>, context: &Context) -> Result<Verdict, String> {
     let [message, reason] = [entry.message, entry.reason].map(book::inline);
-    // A message is one piece of code: without its quotes it reads as it is printed.
+    // A message is formatted as code in the table; without its backquotes it reads as it is printed.
     let code = message.strip_prefix('`').and_then(|text| text.strip_suffix('`')).filter(|text| !text.contains('`'));
     let message = code.unwrap_or(&message).to_owned();
     if context.json {

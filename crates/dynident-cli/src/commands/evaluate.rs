@@ -69,7 +69,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         out.flush().map_err(|source| dynident::Error::Output { path: PathBuf::from("standard output"), source })
     });
     match flushed {
-        // A reader that has closed the pipe (`| head`) has what it needs.
+        // If the reader closed the pipe (as `| head` does), it needs no more rows.
         Err(dynident::Error::Output { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => Ok(Verdict::Good),
         done => done.map(|()| Verdict::Good).map_err(message_of),
     }

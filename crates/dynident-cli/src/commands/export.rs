@@ -30,10 +30,11 @@ pub(crate) struct Options {
     /// Code with the regressor of the base parameters and their values.
     #[arg(long)]
     regressor: bool,
-    /// Width of the steps of friction near zero velocity in code, rad/s (m/s). Default: 0.002 rad/s of a typical arm.
+    /// Width of the smoothed steps of friction at zero velocity in the code, rad/s (m/s). Default: 0.002 rad/s of a
+    /// typical arm.
     #[arg(long, value_name = "WIDTH")]
     step_width: Option<f64>,
-    /// Which payload, if the result has several.
+    /// Name of the payload, if the result has several.
     #[arg(long, value_name = "NAME")]
     payload: Option<String>,
     /// Write to this file instead of standard output, and its held-out error to FILE.validation.json next to it.
@@ -102,7 +103,7 @@ enum Kind {
     SimulatorJson,
     SimulatorTable,
     Payload(ControllerBrand),
-    /// Only for drives that were fitted to commands.
+    /// Files that exist only for drives that were fitted to commands.
     Drives,
 }
 
@@ -209,7 +210,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     write(options, context, exported, Vec::new(), validation.as_ref())
 }
 
-/// Exports the drives of a result of commands and positions.
+/// Exports the drives of a result that was identified from commands and positions.
 fn drives(
     file: &ServoFile,
     result: &Path,

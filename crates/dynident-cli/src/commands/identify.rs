@@ -10,13 +10,13 @@ use dynident::{
 };
 use std::path::{Path, PathBuf};
 
-/// The user's URDF with the new values.
+/// File of the user's URDF with the identified values.
 const URDF: &str = "identified.urdf";
-/// The same as a D-H table, if the user's robot file is one.
+/// File of the user's D-H table with the identified values, if the robot file is one.
 const TABLE: &str = "identified.toml";
-/// The same as an MJCF, if the user's robot file is one.
+/// File of the user's MJCF with the identified values, if the robot file is one.
 const MJCF: &str = "identified.xml";
-/// The same as an SDF, if the user's robot file is one.
+/// File of the user's SDF with the identified values, if the robot file is one.
 const SDF: &str = "identified.sdf";
 
 #[derive(clap::Args)]
@@ -113,7 +113,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }
 
-/// The folder of the result: stated, or named after the study.
+/// Folder of the result: the given one, or one named after the study.
 fn out_folder(options: &Options) -> PathBuf {
     let default = || {
         let stem = options.study.as_deref().and_then(Path::file_stem).unwrap_or("factors".as_ref());
@@ -124,7 +124,7 @@ fn out_folder(options: &Options) -> PathBuf {
     options.out.clone().unwrap_or_else(default)
 }
 
-/// Drives and bodies from commands and positions.
+/// Identifies drives and bodies from commands and positions.
 fn servos(
     study: &Study,
     path: &Path,
@@ -194,8 +194,8 @@ fn of_arm(all: &Factors, arm: &str) -> Result<Factors, String> {
     Ok(own)
 }
 
-/// The command line without options that do not change the result. Folders are omitted, because their names depend on
-/// the computer and not on the result.
+/// The command line of the result without options that do not change the result. Folders are omitted, because their
+/// names depend on the computer.
 fn command(options: &Options) -> String {
     let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let limit = options.max_validation_error.map(|limit| format!(" --max-validation-error {limit}"));

@@ -18,15 +18,15 @@ pub(crate) struct Options {
     folder: PathBuf,
 }
 
-/// The example, as `init --json` prints it.
+/// Output of `init --json`: the written example.
 #[derive(Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct InitFile {
-    /// [`INIT_SCHEMA`].
+    /// Name and version of the schema: [`INIT_SCHEMA`].
     pub schema: String,
-    /// The folder.
+    /// Folder of the example.
     pub folder: String,
-    /// Names of the files in it.
+    /// Names of the files in the folder.
     pub files: Vec<String>,
 }
 

@@ -59,7 +59,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
 }
 
-/// A robot description with problems is still read; the exit status is then negative.
+/// Exit status of `inspect`. A robot description with problems is still read, but then the exit status is that of a
+/// negative result.
 fn verdict(inspection: &Inspection) -> Verdict {
     let problem = inspection.audit.iter().any(|entry| entry.level == "problem");
     if problem || !inspection.slips.is_empty() { Verdict::Negative } else { Verdict::Good }

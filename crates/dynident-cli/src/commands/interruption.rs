@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) const STATUS: u8 = 130;
 
-/// A second Ctrl-C within this time is ignored: held keys repeat, and a robot needs some time to brake.
+/// A second Ctrl-C within this time is ignored, because held keys repeat, and a robot needs some time to brake.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(500);
 
 static FIRST_PRESS: OnceLock<Instant> = OnceLock::new();
@@ -48,7 +48,7 @@ fn on_ctrl_c() {
     std::process::exit(i32::from(STATUS));
 }
 
-/// Calls `job`, which may run a program. Ctrl-C stops that program with all its processes, and then ends the command.
+/// Calls `job`, which may run a program. Ctrl-C then stops that program with all its processes and ends this command.
 pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> R) -> R {
     let begun = Cell::new(false);
     let is_stopped = || {

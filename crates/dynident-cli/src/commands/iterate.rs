@@ -29,7 +29,7 @@ const WRITTEN: [&str; 11] = [
     "controller.json",
 ];
 
-/// This computer only, any free port.
+/// Address of the live page for this computer only, on any free port.
 const LOCAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 #[derive(clap::Args)]
@@ -93,7 +93,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let stop = StopSignal::default();
     interruption::listen(&stop);
-    // A progress bar would overwrite the questions.
+    // A progress bar would overwrite the questions on the terminal.
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let live = options.page.live.then(|| started(options, &study, &stop)).transpose()?;
@@ -148,7 +148,7 @@ fn started(options: &Options, study: &Study, stop: &StopSignal) -> Result<(LiveS
     Ok((server, state))
 }
 
-/// The end of the iteration for the live page.
+/// Text of the live page at the end of the iteration.
 fn last_words(file: &Result<IterationsFile, Error>) -> String {
     match file {
         Ok(file) => format!("the iteration has ended: {}", file.reason),

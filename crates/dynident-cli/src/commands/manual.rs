@@ -15,7 +15,7 @@ pub(crate) fn run(options: &Options, command: clap::Command, _: &Context) -> Res
     let folder = &options.folder;
     let cannot = |error: std::io::Error| format!("{}: cannot be written: {error}", folder.display());
     std::fs::create_dir_all(folder).map_err(cannot)?;
-    // A page on `help` would repeat the list of commands.
+    // A manual page of the command `help` would only repeat the list of commands.
     let mut command = command.disable_help_subcommand(true);
     command.build();
     let one_page = |command: clap::Command| -> Result<(), String> {

@@ -60,7 +60,7 @@ impl Context {
 pub(crate) fn with_threads<R: Send>(threads: usize, job: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(job),
-        // Without threads the job runs here.
+        // Without additional threads the job runs on this thread.
         Err(_) => job(),
     }
 }
@@ -81,7 +81,7 @@ pub(crate) fn message_of(error: impl Into<dynident::Error>) -> String {
     explained(error.to_string(), &error)
 }
 
-/// The message of an error with the command that explains its code, on a separate line.
+/// Message of an error, with a second line that names the command that explains the error's code.
 fn explained(message: String, error: &dynident::Error) -> String {
     match error.code() {
         Some(code) => format!("{message}\nhelp: dynident docs {code}"),
@@ -89,20 +89,20 @@ fn explained(message: String, error: &dynident::Error) -> String {
     }
 }
 
-/// A result.json that is named itself or by its folder.
+/// Path of a result.json; `path` is the file or its folder.
 pub(crate) fn result_file(path: &Path) -> PathBuf {
     if path.is_dir() { path.join("result.json") } else { path.to_owned() }
 }
 
-/// A limit for the relative error, in percent.
+/// Parses a limit of the relative error in percent.
 pub(crate) fn percentage(text: &str) -> Result<f64, String> {
     let value =
         text.trim_end_matches('%').parse::<f64>().map_err(|error| format!("{error}: give a number of percent"))?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
 }
 
-/// Prints the first problems of a result on standard error, and the number of further ones; `listed` states where these
-/// are.
+/// Prints the first problems of a result on standard error, and the number of further ones; `listed` says where all
+/// of them are.
 pub(crate) fn show_problems(problems: &[String], listed: &str) {
     for problem in problems.iter().take(MAX_PROBLEMS_SHOWN) {
         terminal::remark(&format!("PROBLEM: {problem}"));
@@ -112,8 +112,8 @@ pub(crate) fn show_problems(problems: &[String], listed: &str) {
     }
 }
 
-/// Whether the error on every log is at most the limit, if there is one. The error is that of the written model: the
-/// physically consistent model if there is one.
+/// Whether the error on every log is at most the limit, if there is one. It is the error of the written model, which
+/// is the physically consistent one if available.
 pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     let Some(limit) = limit else { return Verdict::Good };
     if logs.is_empty() {
@@ -155,8 +155,8 @@ pub(crate) fn refuse_overwriting(
     dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)
 }
 
-/// Returns the message of an error in a study. If the error is in another file, the message also contains the study's
-/// name.
+/// Returns the message of an error in a study. If the error is in another file, the message also contains the name of
+/// the study.
 pub(crate) fn known_in<E: Into<dynident::Error>>(study: &Path) -> impl Fn(E) -> String {
     use dynident::StudyFileError::{Missing, Recording, Robot, Xacro};
     move |error| {

@@ -78,8 +78,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
 }
 
-/// Changes that a person states on the terminal: a line instead of an uncertain one, or the proposal of the
-/// examination; empty without an answer.
+/// Asks the user on the terminal about an uncertain line of the study. The changes are a line typed by the user, or
+/// the proposal of the examination; empty without an answer.
 fn stated(unsure: &Unsure) -> Vec<StudyChange> {
     if !unsure.proposed.is_empty() {
         let is_agreed = agreed(&format!("{}\nWrite it?", unsure.reason)).unwrap_or(false);

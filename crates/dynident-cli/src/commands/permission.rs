@@ -77,12 +77,12 @@ pub(crate) struct Decisions {
 }
 
 impl Decisions {
-    /// Calls `job` with these decisions as its permission.
+    /// Calls `job` and permits it the programs that these decisions allow.
     pub(crate) fn with<R>(&self, job: impl FnOnce(ProgramPermission<'_>) -> R) -> R {
         job(ProgramPermission::Ask(&|request| self.decide(request)))
     }
 
-    /// Decides on the robot program of a study before the job begins.
+    /// Decides whether the robot program of a study may be started, before the job begins.
     pub(crate) fn decide_on_robot(&self, study: &Study, path: &Path) -> Result<(), String> {
         let robot = study.iteration.as_ref().map(|section| &section.robot);
         let Some(RobotChoice::Process(process)) = robot else { return Ok(()) };
@@ -91,7 +91,8 @@ impl Decisions {
         permitted.map(drop).map_err(refused)
     }
 
-    /// Decides on a program: it is shown once, and started if allowed by an option or after a yes.
+    /// Decides whether a program may be started. It is shown once, and started if an option or the user's answer
+    /// allows it.
     pub(crate) fn decide(&self, request: &ProgramRequest) -> bool {
         if let Some(&decision) = self.made.borrow().get(&request.command) {
             return decision;
@@ -107,11 +108,12 @@ impl Decisions {
     }
 }
 
-/// Length of a command above which its begin may scroll off the screen, characters.
+/// Length of a command above which its first characters may scroll off the screen, characters.
 const LONG_COMMAND_CHARACTERS: usize = 500;
 
-/// The question whether a program may be started. The command is on one line, and for a long one the last line contains
-/// its program and length, so that a hostile command cannot scroll its begin away and end with a fake question.
+/// The question whether a program may be started. The command is on one line. For a long command the last line of the
+/// question contains its program and length, so that a hostile command cannot scroll its first characters away and
+/// end with a fake question.
 fn permission_question(request: &ProgramRequest) -> String {
     let command = request.command_line();
     let command = one_line(&command);
@@ -178,7 +180,7 @@ pub(crate) fn text_asked(question: &str) -> Option<String> {
     Some(answer.trim().to_owned()).filter(|answer| !answer.is_empty())
 }
 
-/// Asks a yes-no question; `None` without a terminal.
+/// Asks a yes-or-no question; `None` without a terminal.
 pub(crate) fn agreed(question: &str) -> Option<bool> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The study file; it must state cut-off and friction, or use --like.
+    /// The study file; it must give cut-off and friction, or use --like.
     study: PathBuf,
     /// The factor file to write.
     #[arg(long, value_name = "FILE")]
@@ -15,20 +15,20 @@ pub(crate) struct Options {
     /// role "identify".
     #[arg(long = "log", value_name = "NAME")]
     logs: Vec<String>,
-    /// Process the logs like this model: with the cut-off, friction and lag of its result.json.
+    /// Process the logs as for this model: with the cut-off, friction and lag of its result.json.
     #[arg(long, value_name = "RESULT.json")]
     like: Option<PathBuf>,
-    /// The robot of the logs, if there are several robots of one kind.
+    /// Name of the robot that recorded the logs, if there are several robots of one type.
     #[arg(long, value_name = "NAME")]
     arm: Option<String>,
     /// Time of the recording: 2026-01-05T08:00:00Z, 2026-01-05 (UTC), or seconds since 1970.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     recorded_at: Option<f64>,
-    /// Number of time segments per log: a few logs need many segments for their error bars, for hundreds of logs one is
-    /// enough.
+    /// Number of time segments per log, for the error bars: a few logs need many segments, for hundreds of logs one
+    /// is enough.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=4096))]
     segments: u16,
-    /// Folder of the recordings, in place of the study's own.
+    /// Folder of the recordings; replaces that of the study.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]

@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Effect of Ctrl-C on a search.
+/// What Ctrl-C does during a search.
 #[derive(Clone, Copy)]
 pub(crate) enum OnInterrupt {
     KeepsBest,
@@ -26,12 +26,12 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Shows the line on a terminal. The search ends after Ctrl-C.
+    /// Shows a progress line on a terminal. The search ends after Ctrl-C.
     pub(crate) fn new(context: &Context, on_interrupt: OnInterrupt) -> Self {
         Self { line: (!context.quiet && terminal::watched()).then(line), on_interrupt }
     }
 
-    /// Updates the line, and ends the search if requested.
+    /// Updates the progress line, and ends the search if requested.
     pub(crate) fn hear(&self, at: &DesignProgress) -> ControlFlow<()> {
         if let Some(line) = &self.line {
             line.set_message(state(at, self.on_interrupt));

@@ -4,7 +4,7 @@ use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, ResultFile, RunOptions, Study, study_inputs, test_samples, validate_result};
 use std::path::{Path, PathBuf};
 
-/// The description of the tables of samples.
+/// File that describes the tables of samples.
 const SAMPLES: &str = "samples.json";
 
 #[derive(clap::Args)]

@@ -1,9 +1,9 @@
-//! `dynident --version --verbose`: what to state in a report of a problem.
+//! `dynident --version --verbose`: what to include in a report of a problem.
 
 use dynident_lanes::Level;
 use std::ffi::OsString;
 
-/// Whether the arguments are `--version` and `--verbose`, in any order. Clap ends at the first of them.
+/// Whether the arguments are `--version` and `--verbose`, in any order. Clap handles only the first of them.
 pub(crate) fn is_requested(arguments: &[OsString]) -> bool {
     let has = |names: [&str; 2]| arguments.iter().skip(1).any(|argument| names.iter().any(|name| argument == name));
     arguments.len() == 3 && has(["--version", "-V"]) && has(["--verbose", "-v"])

@@ -18,7 +18,7 @@ pub(crate) struct Options {
     /// The page.
     #[arg(long, value_name = "FILE", default_value = "view.html")]
     out: PathBuf,
-    /// Folder of the logs and of the robot description, in place of the study's own.
+    /// Folder of the logs and of the robot description; replaces that of the study.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[command(flatten)]
@@ -34,7 +34,7 @@ struct ViewFile {
     bytes: usize,
 }
 
-/// The files by what they are.
+/// The given files, sorted by their type.
 #[derive(Default)]
 struct Given {
     robot: Option<Robot>,
@@ -97,7 +97,7 @@ impl Given {
     }
 }
 
-/// The file `name` in a folder; any other path is the file itself.
+/// Path of the file `name` if `path` is a folder; otherwise `path` itself.
 pub(crate) fn in_folder(path: &Path, name: &str) -> PathBuf {
     if path.is_dir() { path.join(name) } else { path.to_owned() }
 }

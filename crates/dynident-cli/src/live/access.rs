@@ -1,4 +1,5 @@
-//! Who may use the live page: requests with its token, from its own origin, and with its own address as host.
+//! Checks who may use the live page: only requests with its token, from its own origin, and with its own address as
+//! host.
 
 use super::http::Request;
 use std::net::{IpAddr, SocketAddr};
@@ -6,12 +7,12 @@ use std::net::{IpAddr, SocketAddr};
 /// Random bytes of a token: 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
-/// Why a request gets no data.
+/// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refusal {
-    /// A foreign host or origin: 403.
+    /// A foreign host or origin: status 403.
     Foreign,
-    /// Without the token: 404.
+    /// Without the token: status 404.
     Unknown,
 }
 
@@ -39,10 +40,11 @@ impl Access {
         format!("http://{address}/{}/", self.token)
     }
 
-    /// Returns the path of a permitted request below the token.
+    /// Returns the part of a permitted request's path that follows the token.
     pub(super) fn path<'a>(&self, request: &'a Request) -> Result<&'a str, Refusal> {
         let host = request.host.as_deref().filter(|host| self.is_own_host(host)).ok_or(Refusal::Foreign)?;
-        // A page of another site has another origin; one that was rebound to this address has another host.
+        // A page of another site has another origin. A host name that was later redirected to this address is another
+        // host.
         let is_foreign_origin = request.origin.as_ref().is_some_and(|origin| *origin != format!("http://{host}"));
         let is_foreign_site = request.fetch_site.as_ref().is_some_and(|site| site != "same-origin" && site != "none");
         if is_foreign_origin || is_foreign_site {
@@ -63,7 +65,7 @@ impl Access {
     }
 }
 
-/// Compares without a time that depends on the place of the first difference.
+/// Compares in a time that does not depend on the place of the first difference, so that the time reveals nothing.
 fn is_same(one: &[u8], other: &[u8]) -> bool {
     one.len() == other.len() && one.iter().zip(other).fold(0, |differences, (a, b)| differences | (a ^ b)) == 0
 }

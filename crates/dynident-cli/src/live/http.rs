@@ -64,7 +64,7 @@ impl Request {
         Some(request)
     }
 
-    /// A number of the query, such as 7 in `from=7`.
+    /// A number in the query of the address, such as 7 in `from=7`.
     pub(super) fn number(&self, name: &str) -> Option<u64> {
         let value = self.query.split('&').find_map(|pair| pair.split_once('=').filter(|(key, _)| *key == name));
         value.and_then(|(_, value)| value.parse().ok())

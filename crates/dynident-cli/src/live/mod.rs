@@ -1,5 +1,5 @@
-//! The live page of `iterate`: the current run, measured against desired, in the browser, with a stop button. The page
-//! is served on one address of this computer, under a path with a random token.
+//! The live page of `iterate` in the browser: the current run, its measured and desired motion, and a stop button.
+//! The page is served on one address of this computer, under a path with a random token.
 
 mod access;
 mod http;

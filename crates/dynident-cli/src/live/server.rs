@@ -1,4 +1,4 @@
-//! Serves the live page: one thread accepts connections, a bounded number of short threads answers them.
+//! Serves the live page: one thread accepts connections, and a limited number of short-lived threads answer them.
 
 use super::access::{Access, Refusal};
 use super::http::{Request, respond};
@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 const MAX_CONNECTIONS: usize = 32;
-/// Pause after a failed accept, so that a permanent failure does not use a processor.
+/// Pause after a failed attempt to accept a connection, so that a permanent failure does not occupy a processor.
 const RETRY_PAUSE: Duration = Duration::from_millis(100);
 /// Pause while all connections are in use. Each ends within seconds, so further clients wait.
 const FULL_PAUSE: Duration = Duration::from_millis(2);
@@ -30,7 +30,7 @@ pub(crate) struct LiveServer {
 }
 
 impl LiveServer {
-    /// Serves the state on `address` and on no other.
+    /// Serves the live page on `address` and on no other.
     ///
     /// # Errors
     /// An address that cannot be used, or no random numbers.
@@ -56,7 +56,7 @@ impl LiveServer {
 impl Drop for LiveServer {
     fn drop(&mut self) {
         self.ends.store(true, Ordering::SeqCst);
-        // Wakes the waiting thread.
+        // A connection to the own address wakes the thread that waits for connections.
         let mut own = self.address;
         if own.ip().is_unspecified() {
             own.set_ip(if own.is_ipv4() { [127, 0, 0, 1].into() } else { 1_u128.to_be_bytes().into() });
@@ -89,7 +89,7 @@ fn accept(listener: &TcpListener, access: &Arc<Access>, state: &Arc<LiveState>, 
         let (access, state) = (Arc::clone(access), Arc::clone(state));
         let _ = std::thread::Builder::new().name("live request".to_owned()).spawn(move || {
             let _slot = slot;
-            // A client that goes away is ignored.
+            // An error is ignored, because the client may have closed the connection.
             let _ = answer(&mut stream, &access, &state);
         });
     }

@@ -8,16 +8,16 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Samples of a motion that are kept, evenly spaced in time; twice as many at most.
+/// Number of samples of a motion that are kept, evenly spaced in time; at most twice as many.
 const KEPT_SAMPLES: usize = 1500;
 const MAX_SAMPLES: usize = 2 * KEPT_SAMPLES;
-/// Points of a desired motion.
+/// Number of points of a desired motion.
 const DESIRED_POINTS: usize = 600;
-/// Runs of the history that are kept.
+/// Number of runs of the history that are kept.
 const MAX_RUNS: usize = 500;
-/// A page that has not asked for longer is closed.
+/// Time without a request of the page after which it is treated as closed.
 const OPEN_PAGE: Duration = Duration::from_secs(2);
-/// Time for an open page to show the end.
+/// Time for an open page to show the end of the iteration.
 const LAST_LOOK: Duration = Duration::from_millis(1500);
 
 /// State of the iteration, shared between the run and the server.
@@ -51,13 +51,13 @@ struct Motion {
     rows: Vec<Vec<f64>>,
 }
 
-/// The motion without its samples, sent once.
+/// The data of a motion except its samples; they are sent only once.
 #[derive(Clone, Debug, Serialize)]
 struct Head {
     joints: Vec<String>,
     words: String,
     controller: String,
-    /// Length of the motion, and with the paths from and to home, s.
+    /// Duration of the motion, and duration with the paths from and to the home posture, s.
     duration_s: f64,
     whole_s: f64,
     desired: Desired,
@@ -118,7 +118,7 @@ impl LiveState {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Requests the stop of the robot and of the iteration.
+    /// Requests that the robot and the iteration stop.
     pub(crate) fn stop(&self) {
         self.stop.request();
     }
@@ -141,7 +141,7 @@ impl LiveState {
         inner.status = format!("run {} is complete", record.run);
     }
 
-    /// Shows the end, and gives an open page time to show it.
+    /// Shows that the iteration ended, and gives an open page time to show it.
     pub(crate) fn end(&self, status: String) {
         let is_open = {
             let mut inner = self.inner();
@@ -153,14 +153,15 @@ impl LiveState {
         }
     }
 
-    /// The state as JSON. With the numbers of a motion and of samples that the page knows, only newer samples.
+    /// The state as JSON. `known` contains the numbers of the motion and of samples that the page already has; then
+    /// only newer samples are included.
     pub(crate) fn json(&self, known: Option<(u64, u64)>) -> String {
         let answer = {
             let mut inner = self.inner();
             inner.asked = Some(Instant::now());
             self.answer(&inner, known)
         };
-        // Written without the lock, so that the robot's thread never waits for it.
+        // The text is made after the lock is released, so that the robot's thread never waits for it.
         dynident_text::json::to_string(&answer).unwrap_or_else(|_| "{}".to_owned())
     }
 
@@ -220,7 +221,7 @@ impl MotionObserver for LiveState {
         let Some(motion) = &mut inner.begun else { return };
         motion.is_moving = false;
         let record = &run.record;
-        // A robot that does not stream, such as the simulator, has its samples now.
+        // A robot that does not send samples during the run, such as the simulator, delivers all of them at its end.
         if motion.rows.is_empty() {
             for (sample, time_s) in record.times_s.iter().enumerate() {
                 let of = |values: &[f64]| -> Vec<f64> {

@@ -3,7 +3,8 @@ use dynident::CheckFile;
 use dynident::recording::Level;
 use dynident::result::StudyCheck;
 
-/// Largest unexplained percentage that is printed as a number: more only means that no fit was found.
+/// Largest percentage of unexplained torque that is printed as a number; a larger one only means that no fit was
+/// found.
 const MAX_PERCENT: f64 = 1000.0;
 
 pub(crate) fn check(file: &CheckFile) -> String {

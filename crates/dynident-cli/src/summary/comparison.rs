@@ -3,7 +3,7 @@ use core::fmt::Write;
 use dynident::explanation_words;
 use dynident::result::ComparisonFile;
 
-/// Parameters shown; the file contains all.
+/// Maximum number of parameters shown; the file contains all.
 const MAX_SHOWN: usize = 8;
 
 pub(crate) fn comparison(c: &ComparisonFile) -> String {

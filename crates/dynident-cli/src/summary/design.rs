@@ -4,9 +4,9 @@ use dynident::DesignFile;
 use dynident::result::WindowedFile;
 use std::path::Path;
 
-/// Number of limits and parameters shown; the file contains all.
+/// Maximum number of limits and of parameters shown; the file contains all.
 const MAX_SHOWN: usize = 5;
-/// Columns available for an expression.
+/// Columns available for the expression of a base parameter.
 const EXPRESSION_COLUMNS: usize = 40;
 
 pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {

@@ -1,4 +1,4 @@
-//! Findings of the importer; equal findings of several joints and logs are combined.
+//! Findings of the data import; equal findings of several joints and logs are combined.
 
 use super::text::{explained, wrapped};
 use dynident::ResultFile;
@@ -116,7 +116,7 @@ fn sentence(group: &Group, logs: &[LogSummary]) -> String {
     format!("  {level} {}{joints}{places}: {message}{unused}", group.quantity)
 }
 
-/// Splits a message into its numbers and the words between them; there is one more entry of words.
+/// Splits a message into its numbers and the texts between them; there is one more text than numbers.
 fn parted(message: &str) -> (Vec<String>, Vec<(f64, String)>) {
     let (mut words, mut numbers, mut rest) = (vec![String::new()], Vec::new(), message);
     while let Some(first) = rest.chars().next() {

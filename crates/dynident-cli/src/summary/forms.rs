@@ -1,10 +1,10 @@
-//! The held-out error of each form of the model.
+//! The held-out error of the model in each export format.
 
 use super::text::{percent, wrapped};
 use dynident::ResultFile;
 use dynident::model::terms::TermClass;
 
-/// The forms with their errors, one line for each held-out log; empty if no log was held out.
+/// The export formats with their errors, one line for each held-out log; empty if no log was held out.
 pub(super) fn forms(r: &ResultFile) -> String {
     let mut text = String::new();
     for (number, log) in r.validation.iter().enumerate() {

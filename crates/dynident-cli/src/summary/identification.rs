@@ -10,12 +10,12 @@ use dynident::identification::friction::FrictionCandidate;
 use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
 
-/// Number of base parameters shown; the file contains all.
+/// Maximum number of base parameters shown; the file contains all.
 const MAX_SHOWN: usize = 6;
-/// Largest number of held-out logs for which the table shows root mean squares and priors.
+/// Maximum number of held-out logs for which the table shows RMS values and the errors of the prior.
 const MAX_DETAILED_LOGS: usize = 2;
 const MIN_REPORTED_RATIO: f64 = 1.5;
-/// Largest number of held-out logs with a column.
+/// Maximum number of held-out logs with a column of their own.
 const MAX_LOG_COLUMNS: usize = 5;
 const EXPRESSION_COLUMNS: usize = 44;
 
@@ -77,7 +77,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text
 }
 
-/// Bodies that differ from the robot description.
+/// Lists the bodies whose identified values differ from the robot description.
 fn differences(r: &ResultFile) -> String {
     let words = dynident::difference_words(r);
     if words.is_empty() { String::new() } else { wrapped(&format!("{}.", words.join(". ")), 2) }
@@ -126,14 +126,14 @@ fn headline(r: &ResultFile) -> String {
     text + &super::forms::forms(r)
 }
 
-/// The part of the log that determined its own offsets.
+/// The part of a held-out log from which the offsets of this log were determined.
 fn own_offsets(log: &LogValidation) -> String {
     log.own_offsets.as_ref().map_or_else(String::new, |own| {
         format!(" after {:.1}\u{a0}s; the rows before determine the torque offsets of this log", own.fitted_s[1])
     })
 }
 
-/// The error without the intervals of clear events, if there are any.
+/// The error without the time intervals of clear events, if there are any.
 fn without_events(log: &LogValidation) -> String {
     let Some(rest) = &log.without_events else { return String::new() };
     let error = percent(rest.physical.as_ref().unwrap_or(&rest.model).relative_error_percent);
@@ -158,7 +158,8 @@ fn bands(r: &ResultFile) -> String {
     )
 }
 
-/// The unconstrained fit compared with the written model, and whether they differ significantly.
+/// The unconstrained estimate compared with the physically consistent model that is written, and whether they differ
+/// significantly.
 fn beside(r: &ResultFile) -> String {
     let Some(fit) = &r.physical.fit else { return String::new() };
     let free = |log: &LogValidation| format!("{}\u{a0}%", percent(log.model.relative_error_percent));
@@ -242,7 +243,7 @@ fn between_logs(r: &ResultFile) -> String {
     wrapped(&format!("{}; the error bars include this", said.join(", ")), 2)
 }
 
-/// The torque lag of the joints if it is relevant, otherwise its summary.
+/// The torque lag of the joints if it matters, otherwise a summary of it.
 fn lags(r: &ResultFile) -> String {
     let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
     let text = r.method.torque_lag.sentence().map_or_else(String::new, |what| format!("\n  torque lag: {what}\n"));
@@ -262,8 +263,8 @@ fn drives(r: &ResultFile) -> String {
     said.map_or_else(String::new, |choice| wrapped(&format!("drive inertia: {}", choice.sentence()), 2))
 }
 
-/// The friction selected by the training logs compared with the default; and the joints without selection, with the
-/// reason.
+/// The friction laws selected from the training logs compared with the default; and the joints without selection,
+/// with the reason.
 fn friction(r: &ResultFile) -> String {
     let header = ["friction by cross-validation", "chosen Nm", "plain Nm", ""].map(str::to_owned);
     let (chosen, stated): (Vec<_>, Vec<_>) = r.friction_choice.iter().partition(|joint| joint.drive.is_some());
@@ -342,7 +343,7 @@ fn parameters(r: &ResultFile) -> String {
     text
 }
 
-/// Estimates that depend on parameters fixed at the prior, and how to determine these.
+/// Estimates that depend on parameters that were fixed at the prior, and how to determine these parameters.
 fn conditional(r: &ResultFile) -> String {
     let dependent: Vec<_> = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).collect();
     let mut text = String::new();
@@ -392,7 +393,7 @@ fn physics(r: &ResultFile) -> String {
     )
 }
 
-/// Intervals of the bodies' masses from data and physical consistency.
+/// Intervals of the bodies' masses from the data and the conditions of physical consistency.
 fn masses(intervals: &[ParameterInterval]) -> String {
     let end = |end: Option<f64>, open: &str| end.map_or_else(|| open.to_owned(), |end| format!("{end:.3}"));
     let rows = intervals.iter().filter(|interval| interval.unit == "kg").map(|interval| {

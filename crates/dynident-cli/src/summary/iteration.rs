@@ -31,7 +31,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     text
 }
 
-/// Remarks on single runs: rejections, lowered bandwidths, oscillations, warm-ups, held-out motions and forecasts.
+/// Notes on single runs: rejected runs, reduced bandwidths, oscillations, warm-ups, held-out motions and forecasts.
 fn run_remarks(file: &IterationsFile) -> String {
     let mut text = String::new();
     for run in file.runs.iter().filter(|run| !run.accepted) {
@@ -63,7 +63,7 @@ fn run_remarks(file: &IterationsFile) -> String {
     text
 }
 
-/// Remarks on the iteration as a whole: progress, errors, missing checks and unmet conditions.
+/// Notes on the iteration as a whole: progress, errors, missing checks and conditions that were not met.
 fn verdict_remarks(file: &IterationsFile) -> String {
     let mut text = String::new();
     if let Some(forecast) = &file.declined {

@@ -2,13 +2,13 @@ use super::text::{end_of_name, table, wrapped};
 use core::fmt::Write;
 use dynident::result::{LogChannel, LogContents};
 
-/// Largest number of channels shown per group; JSON contains all.
+/// Maximum number of channels shown per group; the JSON output contains all.
 const MAX_SHOWN: usize = 64;
 const MAX_NAME_COLUMNS: usize = 34;
-/// Number of characters for the course of a channel.
+/// Number of characters in which the values of a channel are shown over time.
 const COURSE_COLUMNS: usize = 16;
 
-/// A recording: its groups, their channels with range and course, and a suggested `[format]` for a study.
+/// A recording: its groups, their channels with range and values over time, and a suggested `[format]` for a study.
 pub(crate) fn log(found: &LogContents) -> String {
     let mut text = wrapped(
         &format!("{}: {}, {} bytes, {} channels", found.file, found.format, found.bytes, found.channels.len()),
@@ -24,12 +24,12 @@ pub(crate) fn log(found: &LogContents) -> String {
         }
         text.push('\n');
         text += &wrapped(&line, 2);
-        // All episodes have the channels of the first.
+        // All episodes have the same channels as the first one, so they are shown only once.
         if index > 0 && found.has_episodes() {
             continue;
         }
         let channels: Vec<&LogChannel> = found.channels.iter().filter(|channel| channel.group == index).collect();
-        // The topic is in the line above.
+        // The topic is shown in the line above, so it is removed from the name of the channel.
         let topic = group.name.as_ref().map_or_else(String::new, |name| format!("{name}."));
         let rows = channels.iter().take(MAX_SHOWN).map(|channel| {
             let name = channel.name.strip_prefix(&topic).unwrap_or(&channel.name);
@@ -67,14 +67,15 @@ fn shown(value: f64) -> String {
     format!("{value:.2e}")
 }
 
-/// The course of a channel between its lowest and highest mean, as a line of bars; blank for missing values.
+/// The values of a channel over time, between its lowest and highest mean, as a line of bars; blank for missing
+/// values.
 fn course(channel: &LogChannel) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let values = channel.course.iter().flatten();
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     let count = channel.course.len();
     let bar = |sign: usize| {
-        // Each character shows the middle one of several parts.
+        // Each character shows the middle one of the parts that it covers.
         let part = channel.course[(2 * sign + 1) * count / (2 * count.min(COURSE_COLUMNS))];
         part.map_or(' ', |value| {
             let share = if high > low { (value - low) / (high - low) } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Results as text for people: the most important first, at most [`WIDTH`](text::WIDTH) columns.
+//! Results as text for people: the most important part first, at most [`WIDTH`](text::WIDTH) columns.
 
 mod benchmark;
 mod check;

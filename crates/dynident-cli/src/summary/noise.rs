@@ -4,7 +4,7 @@ use super::text::{percent, wrapped};
 use dynident::ResultFile;
 use dynident::identification::estimators::{NoiseInRegressor, NoiseVerdict};
 
-/// The verdict on noise in the regressor, the rows with low weight in a robust estimator, and results of special
+/// Whether noise in the regressor matters, the rows with low weight in a robust estimator, and results of special
 /// estimators; otherwise empty.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
@@ -28,7 +28,7 @@ pub(crate) fn noise(r: &ResultFile) -> String {
     text
 }
 
-/// Results of the estimators that repeat or simulate the motion, and whether the estimator converged.
+/// Results of special estimators (local noise, periodic or simulated motion), and whether the estimator converged.
 fn loops(r: &ResultFile) -> String {
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
     let mut text = String::new();
@@ -60,7 +60,8 @@ fn loops(r: &ResultFile) -> String {
     text
 }
 
-/// The effect of noise in the regressor in a sentence; empty without an effect, unless instruments were requested.
+/// The effect of noise in the regressor in a sentence; empty without an effect, unless instrumental variables were
+/// requested.
 fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
     let test = &noise.hausman;
     let figures = test
@@ -87,7 +88,7 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
             format!("instruments{band}; least squares would suffice: position noise has no significant effect{figures}")
         }
         NoiseVerdict::Undecided if used => format!("instruments{band}{figures}"),
-        // No effect, or already reported as a problem.
+        // Without an effect, or already reported as a problem.
         NoiseVerdict::BiasesLeastSquares | NoiseVerdict::Harmless | NoiseVerdict::Undecided => String::new(),
     }
 }

@@ -4,7 +4,7 @@ use dynident::result::{ServoFile, ServoForm, ServoLog, ServoNumber};
 use dynident::verdict_words;
 use std::path::Path;
 
-/// Values of a drive in the table: name in the result, and the column.
+/// Quantities of a drive in the table: name in the result, and title of the column.
 const SHOWN: [(&str, &str); 5] = [
     ("stiffness", "stiffness"),
     ("damping", "damping"),
@@ -51,7 +51,7 @@ pub(crate) fn servo(file: &ServoFile, out: &Path, models: &[&str]) -> String {
     text
 }
 
-/// The errors of exported files, next to those of the identified drives.
+/// The held-out errors of the exported files, compared with those of the identified drives.
 fn forms(file: &ServoFile) -> String {
     let Some(model) = file.forms.iter().find_map(ServoForm::mean_errors).map(|[_, model]| model) else {
         return String::new();

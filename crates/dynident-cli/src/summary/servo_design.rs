@@ -3,7 +3,7 @@ use core::fmt::Write;
 use dynident::result::{ServoDesignFile, ServoForecastValue};
 use std::path::Path;
 
-/// Values of a drive in the table: name in the file, and the column.
+/// Quantities of a drive in the table: name in the file, and title of the column.
 const SHOWN: [(&str, &str); 5] = [
     ("stiffness", "stiffness"),
     ("damping", "damping"),

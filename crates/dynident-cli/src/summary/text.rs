@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 pub(super) const WIDTH: usize = 80;
 
-/// Longest name of a joint or body in a table.
+/// Maximum length of the name of a joint or body in a table.
 const MAX_NAME_COLUMNS: usize = 24;
 
 /// Wraps `words` at [`WIDTH`] columns; all lines but the first are indented by `indent` blanks. Longer words are not
@@ -32,7 +32,7 @@ pub(super) fn wrapped(words: &str, indent: usize) -> String {
     text.replace('\u{a0}', " ")
 }
 
-/// The line that names the codes of findings; empty without codes.
+/// The line that names the codes of findings and the command that explains them; empty without codes.
 pub(super) fn explained<'a>(codes: impl Iterator<Item = &'a str>) -> String {
     let codes: BTreeSet<&str> = codes.filter(|code| !code.is_empty()).collect();
     let codes: Vec<&str> = codes.into_iter().collect();
@@ -42,7 +42,7 @@ pub(super) fn explained<'a>(codes: impl Iterator<Item = &'a str>) -> String {
     wrapped(&format!("  help: dynident docs CODE explains {}", codes.join(", ")), 4)
 }
 
-/// A table without lines: names left-aligned, numbers right-aligned, no trailing blanks.
+/// A table without ruled lines: names left-aligned, numbers right-aligned, no trailing blanks.
 pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: Vec<Vec<String>>) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(header);
@@ -62,7 +62,7 @@ pub(super) fn name(name: &str) -> String {
     end_of_name(name, MAX_NAME_COLUMNS)
 }
 
-/// A name of at most `columns` columns: the end is kept, because it distinguishes joints.
+/// A name shortened to at most `columns` columns. Its end is kept, because the end distinguishes joints.
 pub(super) fn end_of_name(name: &str, columns: usize) -> String {
     let length = name.chars().count();
     if length <= columns {
@@ -92,7 +92,7 @@ pub(super) fn with_deviation(value: f64, std: f64) -> [String; 2] {
     [format!("{value:.decimals$}"), format!("{std:.decimals$}")]
 }
 
-/// A sum that fits `longest` columns: its first terms, and the number of terms.
+/// A sum shortened to at most `longest` columns: its first terms, and the number of all terms.
 pub(super) fn shortened(expression: &str, longest: usize) -> String {
     if expression.len() <= longest {
         return expression.to_owned();
@@ -105,7 +105,7 @@ pub(super) fn shortened(expression: &str, longest: usize) -> String {
     format!("{}{tail}", &expression[..cut])
 }
 
-/// `a, b, c and 4 more`.
+/// A list of names such as `a, b, c and 4 more`, with at most `most` names.
 pub(super) fn listed(names: &[&str], most: usize) -> String {
     let shown = names[..names.len().min(most)].join(", ");
     if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }

@@ -66,12 +66,13 @@ pub(super) fn residuals(log: &LogValidation) -> String {
     text
 }
 
-/// Smallest share of the squared error for which a joint at rest is reported.
+/// A joint is reported if at least this share of the squared error comes from its samples at rest.
 const MIN_REPORTED_SHARE: f64 = 0.3;
 
-/// Reports the joint whose rest contributes much of the error: stiction at rest is not determined by the positions.
+/// Reports the joint whose samples at rest contribute much of the error. The positions do not determine the static
+/// friction at rest.
 fn at_rest(log: &LogValidation) -> String {
-    // The residuals have the band of the fit.
+    // Residuals in the frequency band of the fit are used if available.
     let report = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let all: f64 = report.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
     let most = log
@@ -96,7 +97,7 @@ fn at_rest(log: &LogValidation) -> String {
     }
 }
 
-/// The written model: the physically consistent model if there is one, else the estimate.
+/// Validation of the written model: of the physically consistent one if available, otherwise of the estimate.
 pub(super) fn written(log: &LogValidation) -> &ValidationReport {
     log.physical.as_ref().unwrap_or(&log.model)
 }

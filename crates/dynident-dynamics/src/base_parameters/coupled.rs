@@ -1,7 +1,7 @@
-//! Base parameters of robots with coupled joints. The structural rule applies to the joints of a tree; a degree of
-//! freedom that moves several joints measures sums of their columns, so dependencies are found from regressors at
-//! random states. Friction is separate, as in the structural rule: it does not combine with other columns, and each of
-//! its functions of the motion is one condition.
+//! Base parameters of robots with coupled joints. The structural rule is valid for the joints of a tree. A degree of
+//! freedom that moves several joints measures sums of their columns, so here dependencies are found from regressors
+//! at random states. Friction is separate, as in the structural rule: it does not combine with other columns, and
+//! each of its functions of the motion is one condition.
 
 use super::numerical::ScaledRegressors;
 use super::structural::friction_conditions;

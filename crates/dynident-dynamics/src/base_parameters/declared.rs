@@ -1,8 +1,9 @@
-//! Declared torques among the base parameters: a user's expression may equal a gravity torque (`sin(q)` is the weight
-//! of a link), which the structure does not show. So their columns are compared with all others at random states.
+//! Declared (user-defined) torques among the base parameters. A user's expression may equal a gravity torque, for
+//! example `sin(q)` the effect of a link's weight. The structure of the robot does not show this, so declared columns
+//! are compared with all others at random states.
 //!
-//! A declared column that is a combination of the others in the rows of all joints is regrouped like any dependent
-//! column: its coefficient is not identifiable, and base parameters include it.
+//! A declared column that is a combination of other columns in the rows of all joints is regrouped like any dependent
+//! column: its coefficient is not identifiable separately and becomes part of base parameters.
 
 use super::numerical::stacked;
 use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
@@ -42,7 +43,7 @@ pub(crate) fn fault(model: &Model, term: &TorqueTerm) -> Option<DeclaredFault> {
     (largest < MIN_TORQUE_VALUE).then_some(DeclaredFault::Nothing)
 }
 
-/// Regroups declared columns that depend on others. In the structural split each is a base column.
+/// Regroups declared columns that depend on others. The structural split initially treats each as a base column.
 pub(super) fn regrouped(
     model: &Model,
     columns: &[Column],
@@ -103,8 +104,8 @@ struct States {
 }
 
 impl States {
-    /// Positions within the limits of every joint (without limits: ±π or ±1 m), one in four at an end; velocities
-    /// within their limits (without: ±2), accelerations within ±5.
+    /// Random states: positions within the limits of every joint (±π or ±1 m without limits), one in four at a limit;
+    /// velocities within their limits (±2 without limits), accelerations within ±5.
     fn inside_limits(model: &Model, samples: usize) -> Self {
         let mut random = Random::new(SEED);
         let mut states = Self { samples, q: Vec::new(), dq: Vec::new(), ddq: Vec::new() };

@@ -3,8 +3,8 @@
 use super::BaseParameters;
 use crate::regressor_panels::Column;
 
-/// Entries of the regrouping below this (relative to the robot's size) are rounding, also of robot descriptions:
-/// `1.5708` for π/2 has an error of 4e-6.
+/// Regrouping coefficients below this value (relative to the robot's size) are treated as zero. They come from
+/// rounding, also in robot descriptions: `1.5708` for π/2 has an error of 4e-6.
 const MIN_REGROUPING_ENTRY: f64 = 1.0e-4;
 
 /// Whether the torque determines a parameter.
@@ -14,17 +14,18 @@ pub enum Determination {
     Measured,
     /// Only combinations with other parameters are determined.
     Partly,
-    /// Not determined: the value is nominal.
+    /// The torque does not determine the value; it keeps its nominal value.
     Nominal,
 }
 
 impl BaseParameters {
-    /// Determination of every parameter (ten per body, then the terms) by the base parameters, except those with the
-    /// numbers in `fixed`.
+    /// Whether the torque determines each parameter (ten per body, then the terms), if the base parameters with the
+    /// indices `fixed` are not estimated.
     ///
-    /// With `θ = π_i + R π_d` a parameter is determined if it is independent and its row of `R` is zero; it does not
-    /// affect the torque if its column of `R` is zero. `length_m` is a typical link length: entries of `R` are powers
-    /// of lengths, and the threshold for zero scales with them.
+    /// With `θ = π_i + R π_d` (base parameters θ, independent parameters π_i, dependent parameters π_d), a parameter
+    /// is determined if it is independent and its row of `R` is zero. A dependent parameter does not affect the
+    /// torque if its column of `R` is zero. `length_m` is a typical link length: entries of `R` are powers of
+    /// lengths, and the threshold for zero scales with them.
     pub fn determination(&self, fixed: &[usize], length_m: f64) -> Vec<Determination> {
         let mut all = vec![Determination::Nominal; self.all_columns().len()];
         let size = |column: usize| match &self.all_columns()[column] {

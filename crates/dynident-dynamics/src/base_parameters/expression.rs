@@ -11,20 +11,20 @@ pub(super) const NEGLIGIBLE: f64 = 1e-9;
 /// Rounded angles of robot descriptions (`1.5708` for π/2, an error of 4e-6) cause such coefficients.
 const NAME_SHARE: f64 = 1e-5;
 
-/// The same for products of two lengths: 1.4 mm squared on a robot of one metre.
+/// Same threshold for products of two lengths: 1.4 mm squared on a robot of one metre.
 const NAME_SHARE_OF_SQUARES: f64 = 2e-6;
 
 /// Coefficients that are omitted.
 #[derive(Clone, Copy)]
 pub(super) enum Omitted {
-    /// Rounding noise.
+    /// Only rounding noise is omitted.
     Noise,
-    /// Also the effect of rounded angles on a robot of this length, m.
+    /// Coefficients caused by rounded angles are omitted, too, for a robot of this length, m.
     RoundedAngles(f64),
 }
 
 impl Omitted {
-    /// Smallest coefficient of the column `added` that a sum shows whose first parameter is the column `first`.
+    /// Smallest coefficient of column `added` that is shown in a sum whose first parameter is column `first`.
     fn least(self, first: &Column, added: &Column) -> f64 {
         let (Self::RoundedAngles(length), Some(to), Some(from)) = (self, power(first), power(added)) else {
             return NEGLIGIBLE;
@@ -46,9 +46,9 @@ fn power(column: &Column) -> Option<i32> {
 
 #[derive(Clone, Copy)]
 pub(super) enum Digits {
-    /// Six, without trailing zeros, for names.
+    /// Six significant digits without trailing zeros, for names.
     Six,
-    /// Enough to read back the same `f64`.
+    /// As many digits as are needed to read back the same `f64`.
     All,
 }
 
@@ -76,7 +76,7 @@ pub(super) fn expressions(
     sums
 }
 
-/// `None` for one.
+/// Text of a coefficient; `None` for one.
 fn coefficient(value: f64, digits: Digits) -> Option<String> {
     if (value - 1.0).abs() < NEGLIGIBLE {
         return None;

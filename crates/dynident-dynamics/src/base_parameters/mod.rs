@@ -1,10 +1,10 @@
 //! Base parameters: the identifiable combinations of parameters.
 //!
-//! The columns of the regressor are ordered from base to tip as in [`all_columns`](crate::all_columns); a column that
-//! depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from
-//! the robot's structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`],
-//! [`numerical_rank_by_body`]) is the cross-check. Declared torques, which have no structure, and coupled joints use
-//! random states.
+//! The columns of the regressor are ordered from base to tip as in [`all_columns`](crate::all_columns). A column that
+//! depends on earlier columns is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies follow
+//! from the robot's structure ([`structural`]). The rank of regressors at random states ([`numerical_rank`],
+//! [`numerical_rank_by_body`]) is the cross-check. Coupled joints and declared (user-defined) torques, whose
+//! dependencies the structure does not show, use random states.
 
 mod coupled;
 mod declared;
@@ -30,8 +30,9 @@ use nalgebra::DMatrix;
 /// Tolerance of the dependence test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseParameterSettings {
-    /// A direction is dependent below this share of its size. The default, 2e-5, is above the effect of rounded angles
-    /// in robot descriptions (`1.5708` for π/2: 4e-6) and below that of an offset of a tenth of a millimetre (1e-4).
+    /// A column is dependent if the part that other columns do not explain is below this share of it. The default,
+    /// 2e-5, is above the effect of rounded angles in robot descriptions (`1.5708` for π/2: 4e-6) and below that of
+    /// an offset of a tenth of a millimetre (1e-4).
     pub tolerance: f64,
 }
 
@@ -86,8 +87,8 @@ impl BaseParameters {
         &self.split.dependent
     }
 
-    /// `K` of `W[dependent] = W[independent] K`, so that `θ = π[independent] + K π[dependent]`. Shape (independent,
-    /// dependent).
+    /// Regrouping matrix `K` with `W[dependent] = W[independent] K` for the regressor W, so that the base parameters
+    /// are `θ = π[independent] + K π[dependent]`. Shape (independent, dependent).
     pub fn regrouping(&self) -> &DMatrix<f64> {
         &self.split.regrouping
     }
@@ -97,7 +98,7 @@ impl BaseParameters {
         self.split.independent.iter().map(|&index| self.columns[index].clone()).collect()
     }
 
-    /// Values of the base parameters for values of all parameters: `θ = π[independent] + K π[dependent]`.
+    /// Values of the base parameters for values π of all parameters: `θ = π[independent] + K π[dependent]`.
     ///
     /// # Panics
     /// If `parameters` does not have one value per column.
@@ -112,15 +113,15 @@ impl BaseParameters {
         values
     }
 
-    /// The parameters that no motion can determine: they are in no base parameter.
+    /// Indices of the parameters that no motion can determine: no base parameter contains them.
     pub fn unidentifiable(&self) -> Vec<usize> {
         let k = &self.split.regrouping;
         let dependent = self.split.dependent.iter().enumerate();
         dependent.filter(|(d, _)| k.column(*d).amax() < expression::NEGLIGIBLE).map(|(_, &column)| column).collect()
     }
 
-    /// Declared torques that are combinations of other columns, with the symbols of these base columns: their
-    /// coefficients are not identifiable and are included in these base parameters.
+    /// Declared torques that are combinations of other columns, with the symbols of the base parameters concerned.
+    /// The coefficients of these declared torques are not identifiable separately; the base parameters include them.
     pub fn coincident(&self) -> Vec<(&TorqueTerm, Vec<String>)> {
         let dependent = self.split.dependent.iter().zip(self.split.regrouping.column_iter());
         let of_declared = dependent.filter_map(|(&column, factors)| match &self.columns[column] {
@@ -134,27 +135,28 @@ impl BaseParameters {
         of_declared.collect()
     }
 
-    /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`. Factors have six digits, so that the sums can serve as
-    /// names: they are the same on every processor. Factors below 1e-5 (if the unit is m times the robot's length
-    /// [`arm_m`](Model::arm_m)), and below 2e-6 of the squared length if it is m², are omitted: rounded angles such as
-    /// `1.5708` cause them. [`regrouping`](Self::regrouping) and all numbers contain them.
+    /// Readable sums, one per base parameter, for example `Izz1 + 0.49 m2`. Factors have six digits and are the same
+    /// on every processor, so that the sums can serve as names. Small factors that rounded angles such as `1.5708`
+    /// cause are omitted: below 1e-5 for factors in m (times the robot's length [`arm_m`](Model::arm_m)), and below
+    /// 2e-6 for factors in m² (times the squared length). [`regrouping`](Self::regrouping) and all numbers contain
+    /// them.
     pub fn expressions(&self) -> Vec<String> {
         expression::expressions(&self.columns, &self.split, Digits::Six, Omitted::RoundedAngles(self.length_m))
     }
 
-    /// As [`expressions`](Self::expressions) with the small factors, as in results of earlier versions.
+    /// Like [`expressions`](Self::expressions), including the small factors, as in results of earlier versions.
     pub fn complete_expressions(&self) -> Vec<String> {
         expression::expressions(&self.columns, &self.split, Digits::Six, Omitted::Noise)
     }
 
-    /// As [`expressions`](Self::expressions) for calculation, with every factor in the shortest form that reads back
-    /// to the same `f64`. Factors below 1e-9 (rounding) are omitted.
+    /// Like [`expressions`](Self::expressions), but for calculation: every factor has the shortest form that reads
+    /// back to the same `f64`. Factors below 1e-9 (rounding) are omitted.
     pub fn exact_expressions(&self) -> Vec<String> {
         expression::expressions(&self.columns, &self.split, Digits::All, Omitted::Noise)
     }
 
-    /// Gap of the split: smallest independent and largest dependent share. With a wide gap the choice does not depend
-    /// on the tolerance.
+    /// Smallest independent and largest dependent share of a column. If they differ by orders of magnitude, the
+    /// choice of base parameters does not depend on the tolerance.
     pub fn gap(&self) -> (f64, f64) {
         (self.split.weakest_independent, self.split.strongest_dependent)
     }

@@ -11,11 +11,11 @@ use nalgebra::DMatrix;
 /// Result of the rank test at random states.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumericalRank {
-    /// Independent columns by the same left-to-right rule, ascending.
+    /// Indices of the independent columns by the same left-to-right rule, ascending.
     pub independent: Vec<usize>,
     /// Smallest share of a column that was accepted as independent.
     pub weakest_independent: f64,
-    /// Largest share of a column that was called dependent.
+    /// Largest share of a column that was rejected as dependent.
     pub strongest_dependent: f64,
 }
 
@@ -35,11 +35,10 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
 /// Dimensionless regressors at random states: lengths in units of the longest link, inertia and gravity in units of
 /// their largest entries.
 ///
-/// A combination of columns is zero in all states if and only if it is zero at rest and for the contribution of
-/// motion. So rows at rest and rows of that contribution have the same dependencies, for any ratio of gravity to
-/// inertia.
+/// A combination of columns is zero in all states if and only if it is zero at rest and its change due to motion is
+/// zero. So rows at rest and rows of that change have the same dependencies, for any ratio of gravity to inertia.
 pub(super) struct ScaledRegressors {
-    /// Rows of the contribution of motion, joint after joint, then rows at rest; all columns.
+    /// Rows of the change due to motion, joint after joint, then rows at rest; all columns.
     pub(super) rows: DMatrix<f64>,
     pub(super) factors: Vec<f64>,
 }
@@ -111,7 +110,7 @@ pub(super) fn longest_link_m(model: &Model) -> f64 {
     if longest > 0.0 { longest } else { 1.0 }
 }
 
-/// Regressor of some columns at the states of a motion: rows of joint after joint.
+/// Regressor of some columns at the states of a motion, joint after joint.
 pub(super) fn stacked(model: &Model, columns: Vec<Column>, motion: &JointMotion<'_>) -> DMatrix<f64> {
     let (dof, count, samples) = (model.dof(), columns.len(), motion.samples);
     let layout = PanelLayout::new(model, columns);

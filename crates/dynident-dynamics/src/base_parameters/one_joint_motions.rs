@@ -1,10 +1,10 @@
 //! Rank of the bodies' regressor from motions that differ in one joint: the cross-check for long robots.
 //!
 //! If two states differ in joint `j` only (position, velocity and acceleration), the **difference** of the torques of
-//! the inner joints depends on body `j` and the bodies after it only; so do the torques of joint `j`. The rows of all
-//! joints, base to tip, form an upper block triangle, whose rank is at least the sum of the ranks of its diagonal
-//! blocks. A block has ten columns, so the cost is quadratic in the length of a chain (fourth power for
-//! [`numerical_rank`](super::numerical_rank)).
+//! the inner joints depends only on body `j` and the bodies after it. The same is true for the torques of joint `j`.
+//! The rows of all joints, base to tip, form an upper block triangle, whose rank is at least the sum of the ranks of
+//! its diagonal blocks. A block has ten columns, so the cost grows with the square of the length of a chain (with the
+//! fourth power for [`numerical_rank`](super::numerical_rank)).
 
 use super::{NumericalRank, numerical_rank};
 use crate::body_frames::{inertial_wrench, moved};
@@ -22,12 +22,12 @@ fn pairs(joints_on_path: usize) -> usize {
 }
 
 /// Lower bound of the rank of the bodies' columns, body by body: the columns of each body that the torques separate
-/// from those of earlier bodies, at states like those of [`numerical_rank`](super::numerical_rank) that differ in one
-/// joint. A structurally independent column must be among these. Deterministic in `seed`. With coupled joints it is
-/// [`numerical_rank`](super::numerical_rank), because no joint moves alone.
+/// from those of earlier bodies. The states are like those of [`numerical_rank`](super::numerical_rank), but two
+/// states differ in one joint only. Every structurally independent column must be among these columns. Deterministic
+/// in `seed`. For coupled joints, which do not move alone, this is [`numerical_rank`](super::numerical_rank).
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
     if model.coupling().is_some() {
-        // States that differ from those used for the base parameters of such robots.
+        // The seed gives other states than those used for the base parameters of robots with coupled joints.
         return numerical_rank(model, &[], seed + 1, tolerance);
     }
     let maps = model.maps();

@@ -4,8 +4,8 @@ use super::numerical::longest_link_m;
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Model, Transform};
 
-/// Powers of two near the robot's longest link and its gravity. Products with powers of two are exact: a robot of
-/// twice the size has bit-identical structure.
+/// Units that are powers of two near the robot's longest link and its gravity. Products with powers of two are exact:
+/// the base parameters of a robot of twice the size have bit-identical structure.
 pub(super) struct OwnUnits {
     length_m: f64,
     gravity_m_s2: f64,
@@ -23,7 +23,7 @@ impl OwnUnits {
         gravity_m_s2 / self.gravity_m_s2
     }
 
-    /// Unit of a joint's position, m (rad); also the lever of its torque row.
+    /// Unit of a joint's position, m (rad); also the lever arm of its torque row.
     pub(super) fn reach(&self, is_rotary: bool) -> f64 {
         if is_rotary { 1.0 } else { self.length_m }
     }

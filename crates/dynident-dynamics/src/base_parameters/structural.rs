@@ -1,16 +1,17 @@
 //! Identifiable parameter combinations from the robot's structure.
 //!
-//! Torques are zero for all motions if and only if every entry `M_jk(q)` of the mass matrix and every gravity torque
-//! is zero for all `q` (velocity torques follow from the mass matrix). With the composite inertia `C_j(q)` of the
-//! subtree of joint `j` and a twist `w` at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`; the gravity torque is the
-//! same with `w = X a_g`. Both are linear in the parameters. The conditions are finite for three reasons:
+//! The torques are zero for all motions if and only if every entry `M_jk(q)` of the mass matrix and every gravity
+//! torque is zero for all `q` (velocity torques follow from the mass matrix). Let `C_j(q)` be the composite inertia
+//! of the subtree of joint `j` and `w` a twist at its frame. Then `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k` with the joint
+//! axes Φ; the gravity torque is the same with `w = X a_g`. Both are linear in the parameters. The number of
+//! conditions is finite for three reasons:
 //!
-//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint: each joint transforms it
+//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint. Each joint transforms it
 //!    by `X(q) = X_0 + X_1 cos q + X_2 sin q` (prismatic: `X_0 + X_1 q`), where `cos`, `sin` and 1 are independent
 //!    functions.
 //! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q`
-//!    (prismatic: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
-//!    outward, and one for every other harmonic, on the child alone.
+//!    (prismatic: up to `q²`). A condition on a composite splits into one condition on the constant part, shared with
+//!    all bodies farther out, and one for every other harmonic, on the child alone.
 //! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of
 //!    conditions on all parameters.
 //!
@@ -29,9 +30,9 @@ use std::collections::HashMap;
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// Rows over all columns (bodies, then terms) that span the identifiable directions: those of each body, base to tip,
-/// then those of friction. A body's rows have entries for the body, for its subtree and for the terms. They are stored
-/// at the body and transformed outward column by column. All in the robot's [`OwnUnits`].
+/// Rows over all columns (bodies, then terms) that span the identifiable directions: rows of each body, base to tip,
+/// then rows of friction. A body's rows have entries for the body, its subtree and the terms. They are stored at the
+/// body and transformed outward column by column. All are in the robot's [`OwnUnits`].
 pub(super) struct IdentifiableDirections<'a> {
     model: &'a Model,
     terms: &'a [TorqueTerm],
@@ -61,7 +62,8 @@ pub(super) fn identifiable_directions<'a>(
             arriving_twists(model, &units, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite from its own joint, followed by the constants of the terms.
         let own = arriving.iter().map(|w| (power(model, j, w), term_constants(model, &units, terms, j, w, slots)));
-        // Conditions inherited from inner joints: all but the constant harmonic constrain this composite alone.
+        // Conditions inherited from inner joints: every harmonic except the constant one constrains this composite
+        // alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
             .iter()
@@ -141,7 +143,8 @@ impl Columns for IdentifiableDirections<'_> {
     }
 }
 
-/// Minimum number of joints for which a twist's source is stored; only couplings need more.
+/// Minimum number of joints for which the source of a twist (joint axis or gravity) is stored; only couplings need
+/// more.
 const MIN_SOURCE_SLOTS: usize = 48;
 
 /// Number of slots for the sources of twists: joint `k` has slot `k` modulo this number, so that a source is stored as
@@ -243,7 +246,7 @@ fn arriving_twists(
     let mark = |place: usize| DVector::from_fn(slots + 1, |i, _| f64::from(i == place));
     push(&own.into(), mark(j % slots));
     let gravity = model.gravity();
-    // Scaled to about one, like the axes.
+    // Scaled to a length of about one, like the axes.
     let size = gravity.norm().max(f64::MIN_POSITIVE);
     let at_base = [ArrivingTwist {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
@@ -256,7 +259,7 @@ fn arriving_twists(
     };
     for w in from {
         let mut source = w.source.clone();
-        // From here on the slot belongs to this joint.
+        // From here on, this slot stores the source of this joint.
         source[j % slots] = 0.0;
         push(&(motion.twist[0] * w.twist), source);
         for matrix in &motion.twist[1..] {

@@ -130,7 +130,8 @@ impl AssembledProgram {
         parameters
     }
 
-    /// A point strictly inside all constraints: the prior if it is inside, else the point with the most room.
+    /// A point strictly inside all constraints: the prior if it is inside, otherwise the point farthest from the
+    /// constraints.
     pub(super) fn interior_start(&self, problem: &PhysicalProblem) -> Result<DVector<f64>, PhysicalError> {
         let mut x = DVector::zeros(self.program.variables);
         for first in self.starts.iter().flatten() {
@@ -157,7 +158,7 @@ impl AssembledProgram {
     fn roomiest(&self, x: &DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
         let phase = RoomProgram::new(&self.program, x);
         let count = self.program.variables;
-        // A start with half of the possible room is sufficient, according to the duality gap.
+        // A start point with half of the largest possible room t is sufficient; the duality gap bounds that room.
         let enough = |x: &DVector<f64>, now: &Certificate| {
             x[count] > SUFFICIENT_ROOM && x[count] > now.gap * (1.0 + now.objective.abs()) && now.stationarity < 1.0e-3
         };
@@ -187,7 +188,7 @@ impl AssembledProgram {
     }
 }
 
-/// Accuracy of the room, and its minimum: a narrower set has no interior in double precision.
+/// Accuracy and minimum of the room t: a feasible set with less room has no interior in double precision.
 const ROOM_TOLERANCE: f64 = 1.0e-9;
 const MIN_ROOM: f64 = 1.0e-8;
 const SUFFICIENT_ROOM: f64 = 1.0e-6;

@@ -77,7 +77,7 @@ impl Scaling {
         congruence(&self.r_inverse)
     }
 
-    /// As [`scaled_frame`](Self::scaled_frame) from the frame of another pair.
+    /// Like [`scaled_frame`](Self::scaled_frame), but starts from the frame of another pair.
     pub(super) fn scaled_frame_of(&self, other: &Self) -> Matrix10 {
         congruence(&(self.r_inverse * other.l))
     }

@@ -58,7 +58,7 @@ pub(super) struct Program {
     pub(super) variables: usize,
     pub(super) data: DMatrix<f64>,
     pub(super) target: DVector<f64>,
-    /// Limit of the data's half squares. If set, the data are a constraint and not part of f. Its slack and multiplier
+    /// Upper limit of `½‖A x − b‖²`. If set, this term is a constraint and not part of f. Its slack and multiplier
     /// follow those of the rows.
     pub(super) data_limit: Option<f64>,
     pub(super) local: Vec<LocalSquares>,
@@ -73,12 +73,12 @@ pub(super) struct Multipliers {
     pub(super) rows: Vec<f64>,
 }
 
-/// Distance of a pair of point and multipliers from the optimum.
+/// Distance of a point x with its multipliers from the optimum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Certificate {
     /// `‖∇f − Σ Mᵀ Z − Σ a z‖_∞` divided by one plus its largest term.
     pub(super) stationarity: f64,
-    /// The same without division.
+    /// Largest entry of `∇f − Σ Mᵀ Z − Σ a z`, without division.
     pub(super) imbalance: f64,
     /// Duality gap divided by `1 + |f|`: upper bound of the possible decrease of the objective at zero `stationarity`.
     pub(super) gap: f64,

@@ -23,8 +23,8 @@ pub struct PhysicalBody {
     pub mass_kg: Option<Limits>,
     /// Opposite corners of a box around the centre of mass (axes of the body frame, metres).
     pub com_box_m: Option<[[f64; 3]; 2]>,
-    /// Ellipsoid around all of the mass, and so around the centre of mass: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine
-    /// 2018, eq. 24).
+    /// Ellipsoid that contains the whole mass of the body, and therefore its centre of mass: `tr(P Q) ≥ 0` for the
+    /// pseudo-inertia P and the matrix Q of the ellipsoid (Wensing, Kim and Slotine 2018, eq. 24).
     pub inside: Option<Ellipsoid>,
 }
 
@@ -102,7 +102,7 @@ impl BaseMap {
         Self::new(matrix)
     }
 
-    /// B.
+    /// The matrix B of `θ = B π`.
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
@@ -121,9 +121,9 @@ pub struct PhysicalProblem {
     pub(super) triangle: DMatrix<f64>,
     pub(super) rotated: DVector<f64>,
     pub(super) total_mass_kg: Option<Limits>,
-    /// Prior of each body's mass: value and standard deviation, kg.
+    /// Prior of the mass of each body: expected value and standard deviation, kg.
     pub(super) mass_beliefs: Vec<Option<[f64; 2]>>,
-    /// Prior of all values of each body.
+    /// Prior of all ten values of each body.
     pub(super) body_priors: Vec<Option<BodyPrior>>,
 }
 
@@ -132,7 +132,8 @@ pub struct PhysicalProblem {
 pub struct BodyPrior {
     /// The expected values.
     pub parameters: [f64; 10],
-    /// Standard deviation relative to the body: of its mass, of its inertia, and of its extent for the centre of mass.
+    /// Relative standard deviation: of the mass and the inertia relative to their values, of the centre of mass
+    /// relative to the extent of the body.
     pub share: f64,
 }
 
@@ -242,8 +243,8 @@ impl PhysicalProblem {
         Ok(self)
     }
 
-    /// The same problem with the optimum of the data at the base parameters `theta`, to find the nearest consistent
-    /// set in the metric of the data.
+    /// Copies the problem with data whose optimum is at the base parameters `theta`. Its fit is the consistent set
+    /// nearest to `theta`, with distances measured in standard deviations of the data.
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`].
@@ -263,7 +264,7 @@ impl PhysicalProblem {
         &self.scalars
     }
 
-    /// B.
+    /// The map from standard to base parameters.
     pub fn base(&self) -> &BaseMap {
         &self.base
     }

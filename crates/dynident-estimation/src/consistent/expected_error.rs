@@ -6,19 +6,19 @@ use super::error::PhysicalError;
 use super::settings::PhysicalSettings;
 use nalgebra::{DMatrix, DVector};
 
-/// Prior uncertainty of the truth.
+/// Prior uncertainty of the true parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassPrior {
-    /// Relative standard deviation of a body about its reference: of its mass, its inertia, and its extent for the
-    /// centre of mass.
+    /// Relative standard deviation of a body about its reference: of the mass and the inertia relative to their
+    /// values, of the centre of mass relative to the extent of the body.
     pub body_share: f64,
     /// Standard deviation of each scalar about its prior, in the unit of the scalar.
     pub scalar_std: Vec<f64>,
 }
 
 /// Standard deviation of the error of every parameter of a [`physical_fit`](super::physical_fit) (ten per body, then
-/// the scalars) for a truth drawn from `belief`; zero for known bodies. `covariance` (base, base) is that of the
-/// fitted base parameters, including all its extra terms.
+/// the scalars) if the true parameters are distributed as `belief`; zero for known bodies. `covariance` (base, base)
+/// is that of the fitted base parameters, including all its extra terms.
 ///
 /// Linearised about its reference, the fit is `x̂ = A GᵀR₁ θ̂ + ..` with `A = (GᵀG + W)⁻¹`: G are the weighted rows
 /// over the unknowns x in units of the belief's standard deviation, W is the information of the fit's prior. The error
@@ -43,7 +43,7 @@ pub fn expected_error(
     finite("an entry of the covariance", covariance.as_slice())?;
     finite("a deviation of a scalar", &belief.scalar_std)?;
 
-    // One standard deviation of every unknown in parameters, and the rows of the fit's prior over the unknowns.
+    // Change of the parameters by one standard deviation of every unknown, and the rows of the fit's prior.
     let free: Vec<usize> = (0..problem.bodies.len()).filter(|&body| problem.bodies[body].known.is_none()).collect();
     let unknowns = 10 * free.len() + problem.scalars.len();
     let mut spread = DMatrix::zeros(parameters, unknowns);
@@ -82,7 +82,7 @@ pub fn expected_error(
     }
     let prior_rows = DMatrix::from_fn(prior_rows.len(), unknowns, |row, column| prior_rows[row][column]);
 
-    // A = (GᵀG + W)⁻¹ from the triangle of the stacked rows, which has twice the digits.
+    // A = (GᵀG + W)⁻¹ from the triangle of the stacked rows, which keeps twice as many digits as GᵀG.
     let rows = &problem.triangle * (problem.base.matrix() * &spread);
     let mut stacked = DMatrix::zeros(rows.nrows() + prior_rows.nrows(), unknowns);
     stacked.rows_mut(0, rows.nrows()).copy_from(&rows);

@@ -33,7 +33,7 @@ pub struct PhysicalBodyFit {
     pub least_whitened_eigenvalue: f64,
     /// Smallest eigenvalue of the pseudo-inertia in SI units.
     pub least_eigenvalue: f64,
-    /// Whether the body is on the margin, i.e. the data alone give an inconsistent body.
+    /// Whether the body is at the margin of physical consistency: the data alone give an inconsistent body.
     pub on_the_boundary: bool,
 }
 
@@ -68,13 +68,13 @@ pub struct PhysicalFit {
 }
 
 impl PhysicalFit {
-    /// The larger of stationarity and duality gap; all points are feasible.
+    /// The larger of stationarity and duality gap. Every returned point satisfies the constraints.
     pub fn kkt_residual(&self) -> f64 {
         self.stationarity.max(self.duality_gap)
     }
 
-    /// Change of every base parameter from the estimate `values` in units of the standard deviations `std`; `None` if
-    /// that is zero.
+    /// Change of every base parameter from the estimate `values`, divided by the standard deviation in `std`; `None`
+    /// where this standard deviation is zero.
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`] for a wrong number of values.
@@ -94,9 +94,9 @@ impl PhysicalFit {
 /// ```
 ///
 /// The problem is convex with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3
-/// (2018) 60; Lee, Wensing and Park, T-RO 36 (2020) 348). The data depend on base parameters only, the prior
-/// determines the other directions: any other consistent set fits better by at most γ times its additional distance
-/// from the prior. The duality gap certifies the result independently of the solver.
+/// (2018) 60; Lee, Wensing and Park, T-RO 36 (2020) 348). The data depend on base parameters only; the prior
+/// determines all other combinations. Any other consistent set fits the data better by at most γ times its additional
+/// distance from the prior. The duality gap certifies the result independently of the solver.
 ///
 /// ```
 /// use dynident_estimation::consistent::{BaseMap, PhysicalBody, PhysicalProblem, physical_fit, rough_body};
@@ -136,7 +136,7 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     Ok(finished(problem, settings, &assembled, &solved))
 }
 
-/// As [`physical_fit`], and also returns the iterates of the interior-point method for any route.
+/// Like [`physical_fit`], and also returns the iterates of the interior-point method for any route.
 pub(super) fn physical_fit_with_path(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,

@@ -73,7 +73,7 @@ pub(super) fn interior_point(
     from_state(program, State::new(program, start)?, tolerance, max_iterations, &mut |_, _| false)
 }
 
-/// As [`interior_point`], but stops at the first point for which `enough` is true.
+/// Like [`interior_point`], but stops at the first point for which `enough` is true.
 pub(super) fn interior_point_until(
     program: &Program,
     start: DVector<f64>,

@@ -17,14 +17,14 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalSettings {
     /// Confidence level of each interval. Default 0.95.
     pub level: f64,
-    /// Solver, margin and prior. The prior only selects among bodies that fit the data equally well, so its weight is
-    /// far below that of a fit: default 1e-5.
+    /// Solver, margin and prior. The prior only selects among bodies that fit the data equally well, so its default
+    /// weight, 1e-5, is far below that of a fit.
     pub physical: PhysicalSettings,
-    /// An end is open beyond this multiple of the reference's size (the body's own moments, a scalar's `scale`).
-    /// Default 100.
+    /// An end of an interval is open if its distance from the best value exceeds this multiple of the typical size of
+    /// the parameter (from the reference body; for a scalar its `scale`). Default 100.
     pub open_beyond: f64,
-    /// Maximum number of thresholds per end, each from the change of the residuals at the previous one. Default 5; one
-    /// or two are usual.
+    /// Maximum number of iterations per end. Each computes the threshold again from the change of the residuals at
+    /// the previous end. Default 5; one or two are usual.
     pub max_limits: usize,
 }
 
@@ -91,12 +91,12 @@ pub struct ConsistentInterval {
 ///     { p : min over consistent π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
 /// ```
 ///
-/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is the variance inflation by correlated
-/// residuals in the direction of π_i, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of the base parameters.
-/// Without active constraints this is the usual interval `π̂_i ± t σ_i`; ends that only physical consistency limits
-/// and open ends are marked. Profile likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87. Here every
-/// end is a convex problem (the extreme value of the parameter below the threshold), solved to a hundredth of the
-/// half-width.
+/// C_min is the cost of the best consistent set and t Student's quantile. κ_i is the factor by which correlated
+/// residuals increase the variance in the direction of π_i, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of the
+/// base parameters. Without active constraints this is the usual interval `π̂_i ± t σ_i`. Open ends and ends that
+/// only physical consistency limits are marked. Profile likelihood: Venzon and Moolgavkar, Applied Statistics 37
+/// (1988) 87. Here every end is a convex problem (the extreme value of the parameter below the threshold), solved to
+/// a hundredth of the half-width.
 #[derive(Clone, Debug)]
 pub struct ConsistentIntervals {
     problem: PhysicalProblem,
@@ -109,7 +109,7 @@ pub struct ConsistentIntervals {
     left: DVector<f64>,
     covariance: Option<DMatrix<f64>>,
     mean_inflation: f64,
-    /// κ of each standard parameter without constraints.
+    /// κ (variance inflation by correlated residuals) of each standard parameter without constraints.
     inflations: Vec<f64>,
     /// Approximate standard deviation of each standard parameter without constraints; large without data.
     deviations: Vec<f64>,
@@ -314,7 +314,7 @@ impl ConsistentIntervals {
         }
     }
 
-    /// κ in the direction of the moved rows, R₁ times the shift of the base parameters.
+    /// κ (variance inflation) in the direction of the moved rows, R₁ times the shift of the base parameters.
     fn inflation(&self, moved: &DVector<f64>) -> f64 {
         let Some(covariance) = &self.covariance else { return 1.0 };
         inflation(&self.problem, covariance, moved).unwrap_or(self.mean_inflation)

@@ -102,7 +102,7 @@ impl Kernel for Rest<'_> {
                 let ((x1, x2), (a1, a2)) = (split(x), split(a));
                 let product = a * x;
                 let lost = a2 * x2 - (((product - a1 * x1) - a2 * x1) - a1 * x2);
-                // As in `two_sum`.
+                // Rounding error of the sum, as in `two_sum`.
                 let next = sum + product;
                 let part = next - sum;
                 let rounding = (sum - (next - part)) + (product - part);

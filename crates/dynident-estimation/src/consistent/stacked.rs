@@ -7,8 +7,8 @@
 //! matrix and need no reflection. The data rows are then reflected into the block triangle of these and the other rows
 //! of the same body.
 //!
-//! Solved with the triangle and refined with the rows (corrected seminormal equations: Björck, Linear Algebra Appl. 88
-//! (1987) 31).
+//! The system is solved with the triangle and refined with the rows (corrected seminormal equations: Björck, Linear
+//! Algebra Appl. 88 (1987) 31).
 
 use super::coordinates::Matrix10;
 use super::products::{add_transposed, solve_lower, solve_upper, subtract_product};

@@ -2,17 +2,17 @@
 //!
 //! The time segments are distributed over K blocks in turn, so that every block covers all parts of the motion. For
 //! each left-out block k, all other rows of all joints are reduced to one triangle whose last columns are the
-//! candidates:
+//! candidates (columns v after the common columns c):
+//!
 //! ```text
-//! ```text
+//!     [ R_cc  R_cv  r_c ]
 //!     [  0    R_vv  r_v ]
 //! ```
 //!
 //! The coefficients of a candidate model with some of the columns v follow from `R_vv` and `r_v` alone (a few
-//! unknowns), the others by substitution, and the error on block k from that block's own triangle. The rows are
-//! reduced
-//! once per block for any number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
-//! 413).
+//! unknowns), the other coefficients by substitution. The error on block k follows from the triangle of that block.
+//! The rows are reduced once per block for any number of candidates (variable projection: Golub and Pereyra, SIAM J.
+//! Numer. Anal. 10 (1973) 413).
 
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::{EstimationError, require};
@@ -21,7 +21,7 @@ use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// A column is dependent if earlier columns leave a smaller share of it.
+/// A column is dependent if the share of it that earlier columns do not explain is smaller than this.
 const DEPENDENCE_TOLERANCE: f64 = 1.0e-8;
 
 /// The rows of a problem, cut into blocks of time.

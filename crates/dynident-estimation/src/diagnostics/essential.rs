@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct EssentialSettings {
     /// Parameters are dropped until the largest relative standard deviation is below this multiple of the smallest.
-    /// Default 30, as in published fits of the TX40; 10 is strict.
+    /// Default 30, as in published fits of the Stäubli TX40; 10 is strict.
     pub ratio: f64,
-    /// Dropping also ends if the probability of the F-test falls below this level, so that noise does not explain the
-    /// growth of the residual. Default 0.05.
+    /// Dropping also ends if the p-value of the F-test falls below this level: the residual then grows by more than
+    /// noise explains. Default 0.05.
     pub significance: f64,
 }
 
@@ -46,9 +46,9 @@ pub struct DroppedParameter {
     pub value: f64,
     /// Relative standard deviation before it was dropped, percent: the largest of all.
     pub relative_std_percent: f64,
-    /// Ratio to the smallest relative standard deviation.
+    /// Ratio of this relative standard deviation to the smallest one.
     pub times_smallest: f64,
-    /// F of the growth of the residual, with all parameters dropped so far.
+    /// F statistic of the growth of the residual, for all parameters dropped so far.
     pub f: f64,
     /// Probability of a larger F if all dropped parameters were zero.
     pub p_value: f64,
@@ -71,7 +71,7 @@ pub enum EssentialEnd {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EssentialReport {
-    /// Parameters kept.
+    /// Number of parameters kept.
     pub kept: usize,
     /// Parameters dropped, in order.
     pub dropped: Vec<DroppedParameter>,
@@ -83,17 +83,18 @@ pub struct EssentialReport {
 
 /// Holds all but the essential parameters at zero (Pham and Gautier, "Essential parameters of robots", CDC 1991).
 ///
-/// Drops the parameter with the largest relative standard deviation until that is below `ratio` times the smallest, or
-/// until the F-test rejects:
+/// Repeatedly drops the parameter with the largest relative standard deviation. Stops when the largest is below
+/// `ratio` times the smallest, or when the F-test rejects:
 ///
 /// ```text
 ///     θ_e' = θ_e − V_ed V_dd⁻¹ θ_d,   F = θ_dᵀ V_dd⁻¹ θ_d / d  ~  F(d, N − p)
 /// ```
 ///
-/// V is the covariance under white noise, d the number of dropped parameters. Both results equal those of a new fit
-/// with the same weights and fewer columns. With coloured residuals F is too large and fewer parameters are dropped
-/// than possible. The covariance of the rest is the chosen one, transformed by the same map; it does not include the
-/// effect of selecting on the same data.
+/// V is the covariance under white noise, d the number of dropped parameters, N the number of rows and p that of
+/// parameters. Both results equal those of a new fit with the same weights and fewer columns. With correlated
+/// residuals F is too large, and fewer parameters are dropped than possible. The covariance of the remaining
+/// parameters is the covariance of `estimate`, transformed by the same map; it does not include the effect of
+/// selecting on the same data.
 ///
 /// # Errors
 /// [`EstimationError::Setting`].
@@ -150,13 +151,13 @@ pub fn essential(
     }
 }
 
-/// F of holding columns at zero, and the remaining estimate.
+/// F statistic for holding `columns` at zero, and the estimate of the remaining parameters.
 fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     let all = estimate.values.len();
     let white = &estimate.covariance_white;
     let block = white.select_rows(columns).select_columns(columns);
     let theta = DVector::from_iterator(columns.len(), columns.iter().map(|column| estimate.values[*column]));
-    // Positive definite: a part of an inverse information. Where rounding has eaten that, nothing may be dropped.
+    // A block of a covariance is positive definite. If rounding destroyed this property, no parameter may be dropped.
     let Some(factor) = block.cholesky() else { return (f64::INFINITY, estimate.clone()) };
     let f = theta.dot(&factor.solve(&theta)) / columns.len() as f64;
     // θ' = C θ with C = 1 − V_·d V_dd⁻¹ E_dᵀ.
@@ -174,7 +175,7 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     reduced.covariance = &map * &estimate.covariance * map.transpose();
     reduced.covariance_white = &map * white * map.transpose();
     reduced.std = reduced.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
-    // Residuals keep their share of every error bar.
+    // The ratio of the noise part to the whole error bar stays the same for every parameter.
     let share = |(noise, std): (&f64, &f64)| if *std > 0.0 { noise / std } else { 0.0 };
     let shares = estimate.noise_std.iter().zip(&estimate.std).map(share);
     reduced.noise_std = reduced.std.iter().zip(shares).map(|(std, share)| std * share).collect();

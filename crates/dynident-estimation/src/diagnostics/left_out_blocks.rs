@@ -20,10 +20,10 @@ struct Block {
 /// θ₋ₖ = θ − A₋ₖ⁻¹ s_k,   V₋ₖ = A₋ₖ⁻¹ A V A A₋ₖ⁻¹,   A = Σ W_jᵀW_j / σ_j²,   s_k = Σ_j W_jkᵀ(τ_jk − W_jk θ) / σ_j²
 /// ```
 ///
-/// with the estimate θ, its covariance V and the joints' noise σ_j (Nm, N), n_jk rows of joint j in block k. A is the
-/// information of all rows and of the prior, A₋ₖ that without block k; columns that were not estimated are not
-/// changed. Every log is divided into equally many blocks of equal length, at least `blocks` in all. A block is
-/// ignored if the others do not determine the parameters.
+/// with the estimate θ, its covariance V and the joints' noise σ_j (Nm, N); block k has n_jk rows of joint j. A is
+/// the information of all rows and of the prior, A₋ₖ the information without block k. Columns that were not estimated
+/// are not changed. Every log is divided into the same number of blocks of equal length, at least `blocks` in all. A
+/// block is ignored if the other blocks do not determine the parameters.
 ///
 /// For a correct model κ is about 1. A model that drifts with temperature or lacks a term predicts new data worse than
 /// its residuals suggest. One-step deletion is exact for weighted least squares with these weights (Cook and Weisberg,

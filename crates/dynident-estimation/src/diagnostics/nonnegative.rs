@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// A column is dependent if the others leave a share with a smaller square.
+/// A column is dependent if the square of the share of it that other columns do not explain is smaller than this.
 const MIN_REMAINING_SQUARE: f64 = 1.0e-12;
 
-/// `argmin ‖A x − b‖²` with `x_k ≥ 0` where `nonnegative[k]`, from `gram = AᵀA` and `right = Aᵀb`.
+/// Solves `argmin ‖A x − b‖²` with `x_k ≥ 0` where `nonnegative[k]` is set, from `gram = AᵀA` and `right = Aᵀb`.
 ///
 /// Active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23; unconstrained unknowns are
 /// never active. A column that others explain up to 1e-6 of its norm is excluded (zero). After at most `4 n + 10`
@@ -16,7 +16,7 @@ const MIN_REMAINING_SQUARE: f64 = 1.0e-12;
 /// If sizes differ.
 pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonnegative: &[bool]) -> DVector<f64> {
     let n = right.len();
-    // Unit diagonal, so that one tolerance suits all columns.
+    // Scaled to a unit diagonal, so that one tolerance is valid for all columns.
     let scale: Vec<f64> = (0..n).map(|k| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { 0.0 }).collect();
     let usable = |k: usize| scale[k] > 0.0;
     let scaled = |i: usize, j: usize| if usable(i) && usable(j) { gram[(i, j)] / (scale[i] * scale[j]) } else { 0.0 };
@@ -35,7 +35,7 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
     let size = right.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
     let mut refused = vec![false; n];
     for _ in 0..4 * n + 10 {
-        // The unknown with the largest gradient; the first one if equal.
+        // The unknown with the largest gradient; the first such unknown if several are equal.
         let gradient = |k: usize| right[k] - matrix[k * n..(k + 1) * n].iter().zip(&x).map(|(a, x)| a * x).sum::<f64>();
         let enters = (0..n)
             .filter(|k| nonnegative[*k] && usable(*k) && !refused[*k] && !passive.places.contains(k))
@@ -44,7 +44,7 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let Some((enters, _)) = enters else { break };
         if !passive.push(enters, MIN_REMAINING_SQUARE) {
-            // Depends on the unknowns in the set.
+            // The unknown is a combination of those already in the set.
             refused[enters] = true;
             continue;
         }
@@ -126,7 +126,7 @@ impl<'a> PassiveSet<'a> {
         self.factor.truncate(first * (first + 1) / 2);
         self.forward.truncate(first);
         behind.into_iter().filter(|k| !leaving.contains(k)).for_each(|k| {
-            // Independent of the larger set, so also of the remaining one.
+            // The unknown was independent of the larger set, so it is also independent of the remaining set.
             self.push(k, f64::MIN_POSITIVE);
         });
     }

@@ -30,9 +30,9 @@ pub struct NormalityReport {
     pub skewness: f64,
     /// K: 3 for the normal distribution.
     pub kurtosis: f64,
-    /// JB.
+    /// JB, the test statistic.
     pub jarque_bera: f64,
-    /// Probability of a larger JB if residuals were normal and independent.
+    /// p-value: probability of a larger JB if the residuals were normally distributed and independent.
     pub p_value: f64,
 }
 

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Sums of squared residuals by the joint's velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
-/// rad/s on), for an arm of usual length. Scale the velocities of other machines to their size.
+/// Sums of squared residuals in three ranges of the joint's velocity: at rest (|q̇| below 0.005 rad/s), reversal (up
+/// to 0.1 rad/s) and fast (from 0.1 rad/s on). The limits suit an arm of about 1.2 m; scale the velocities of other
+/// machines by their size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedRanges {
     sums: [(usize, f64); 3],
@@ -13,7 +14,7 @@ pub struct SpeedRanges {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangeFigures {
-    /// Samples.
+    /// Number of samples.
     pub samples: usize,
     /// RMS residual, Nm (N); `None` without samples.
     pub rmse_nm: Option<f64>,
@@ -23,21 +24,21 @@ pub struct SpeedRangeFigures {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangesReport {
-    /// |q̇| below 0.005 rad/s (m/s) for an arm of 1.2 m, scaled for other machines.
+    /// |q̇| below 0.005 rad/s (m/s) for an arm of 1.2 m; velocities of other machines are scaled by their size.
     pub at_rest: SpeedRangeFigures,
-    /// |q̇| from 0.005 to 0.1 rad/s (m/s), scaled likewise.
+    /// |q̇| from 0.005 to 0.1 rad/s (m/s), scaled by the size of the machine.
     pub reversal: SpeedRangeFigures,
-    /// |q̇| from 0.1 rad/s (m/s) on, scaled likewise.
+    /// |q̇| from 0.1 rad/s (m/s) on, scaled by the size of the machine.
     pub fast: SpeedRangeFigures,
 }
 
 impl SpeedRanges {
-    /// Below this velocity a joint is at rest, rad/s (m/s) of a usual arm.
+    /// A joint is at rest below this velocity, rad/s (m/s), for an arm of 1.2 m.
     pub const REST_BELOW: f64 = 0.005;
-    /// Below this velocity a joint is reversing (friction dominates), rad/s (m/s) of a usual arm.
+    /// A joint is reversing below this velocity (friction dominates), rad/s (m/s), for an arm of 1.2 m.
     pub const REVERSAL_BELOW: f64 = 0.1;
 
-    /// Adds a residual at a velocity, rad/s (m/s) scaled to a usual arm.
+    /// Adds a residual at a velocity in rad/s (m/s), scaled to an arm of 1.2 m.
     pub fn add(&mut self, speed: f64, residual: f64) {
         let speed = speed.abs();
         let place = usize::from(speed >= Self::REST_BELOW) + usize::from(speed >= Self::REVERSAL_BELOW);

@@ -39,7 +39,7 @@ pub struct Validation {
 pub struct JointValidation {
     /// The joint.
     pub name: String,
-    /// Samples compared.
+    /// Number of compared samples.
     pub samples: usize,
     /// `√(Σ(τ − τ̂)² / samples)`.
     pub rmse_nm: f64,
@@ -51,21 +51,22 @@ pub struct JointValidation {
     pub r_squared: Option<f64>,
 }
 
-/// Errors of all joints stacked into one vector (with its own mean in R²), and of every joint.
+/// Errors of all joints stacked into one vector, and of every joint. R² of the stacked vector uses the mean over all
+/// joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ValidationReport {
     /// Largest number of samples of any joint.
     pub samples: usize,
-    /// As [`JointValidation::rmse_nm`], over all joints stacked.
+    /// Like [`JointValidation::rmse_nm`], over all joints stacked.
     pub rmse_nm: f64,
-    /// As [`JointValidation::relative_error_percent`], over all joints stacked.
+    /// Like [`JointValidation::relative_error_percent`], over all joints stacked.
     pub relative_error_percent: Option<f64>,
-    /// As [`JointValidation::max_error_nm`], over all joints.
+    /// Like [`JointValidation::max_error_nm`], over all joints.
     pub max_error_nm: f64,
-    /// As [`JointValidation::r_squared`], over all joints stacked.
+    /// Like [`JointValidation::r_squared`], over all joints stacked.
     pub r_squared: Option<f64>,
-    /// Every joint.
+    /// Errors of every joint.
     pub joints: Vec<JointValidation>,
 }
 
@@ -145,7 +146,7 @@ impl Sums {
         self.max_error = self.max_error.max(error.abs());
     }
 
-    /// Merges two series (Chan, Golub and LeVeque, The American Statistician 37 (1983) 242).
+    /// Merges the sums of two sets of samples (Chan, Golub and LeVeque, The American Statistician 37 (1983) 242).
     fn merged(&self, other: &Self) -> Self {
         let samples = self.samples + other.samples;
         let difference = other.mean - self.mean;

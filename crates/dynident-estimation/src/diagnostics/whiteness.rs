@@ -33,18 +33,18 @@ pub struct Whiteness {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WhitenessReport {
-    /// Correlation of neighbouring residuals.
+    /// Correlation of consecutive residuals (lag 1).
     pub lag1_correlation: f64,
-    /// Q.
+    /// Q, the test statistic.
     pub ljung_box: f64,
-    /// Lags in Q.
+    /// Number of lags in Q.
     pub lags: usize,
-    /// Probability of a larger Q if residuals were white.
+    /// p-value: probability of a larger Q if the residuals were white.
     pub p_value: f64,
 }
 
 impl Whiteness {
-    /// Adds the next residual of the series.
+    /// Adds the next residual in order of time.
     pub fn add(&mut self, residual: f64) {
         for lag in 1..=LAGS.min(self.count) {
             self.products[lag - 1] += residual * self.recent[(self.count - lag) % LAGS];

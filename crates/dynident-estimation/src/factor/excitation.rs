@@ -8,20 +8,20 @@ use super::problem::LinearProblem;
 use super::unexcited::Unexcited;
 use crate::error::{EstimationError, expect};
 
-/// Minimum ratio of a column's square sum, after removal of the other excited columns, to that of the noise. Noise
-/// alone gives 1 (less for products of noise), and up to 3 with few rows and an estimated noise level. At 4 the motion
-/// has three times the power of the noise.
+/// Minimum ratio of a column's sum of squares, after removal of the other excited columns, to that of the noise in
+/// the column. The ratio is about 1 if the column contains only noise (less for products of noise, up to 3 with few
+/// rows and an estimated noise level). At 4 the motion has three times the power of the noise.
 const MIN_POWER_OVER_NOISE: f64 = 4.0;
 
-/// Share of a column's norm below which other columns explain it completely: the default of
+/// Relative norm of the remainder below which other columns explain a column completely: the default of
 /// [`RankSettings`](super::RankSettings).
 const DEPENDENCE_TOLERANCE: f64 = 1.0e-8;
 
-/// Finds the columns that are not excited, i.e. that contain only noise and combinations of other columns. Exactly
-/// dependent columns are excluded: the rank decision selects which of those are held.
+/// Finds the columns that are not excited: they contain only noise and combinations of other columns. Columns that
+/// depend exactly on others are not included: the rank decision selects which of these are held.
 ///
-/// `noise` is a problem over the same columns: `NᵀN` is the contribution of motion noise to `WᵀW`. `weights` are those
-/// of the joints, 1/σ. `scales`, if known, are the expected errors of the parameters.
+/// `noise` is a problem over the same columns: `NᵀN` is the contribution of the noise of the motion to `WᵀW`.
+/// `weights` are the weights 1/σ of the joints. `scales`, if known, are the expected errors of the parameters.
 ///
 /// Greedy selection: each selected column is projected out of all others. The remainder of column c is `r_c = W_c −
 /// W_F k`, and that of its noise is `n_c = N_c − N_F k` with the same k. While some column has `‖r_c‖² ≥ 4 ‖n_c‖²`,
@@ -77,7 +77,7 @@ pub fn unexcited_columns(
             made.column_mut(column).axpy(-share, &noise, 1.0);
         }
     }
-    // Columns explained to rounding are left to the rank decision.
+    // Columns that others explain up to rounding are left to the rank decision.
     left.retain(|&column| rows.column(column).norm_squared() > DEPENDENCE_TOLERANCE * DEPENDENCE_TOLERANCE);
     // The part of a noise column that other columns explain is a chance correlation, not larger than the noise.
     let is_noise =

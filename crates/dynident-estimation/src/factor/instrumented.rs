@@ -1,4 +1,5 @@
-//! Rows with instruments: `[Z | W | τ]`, where Z has the columns of W from a motion without the noise of W.
+//! Rows with instrumental variables: `[Z | W | τ]` of instruments Z, regressor W and torque τ. Z has the columns of
+//! W, computed from a motion that does not contain the noise of W.
 
 use super::problem::LinearProblem;
 use super::segmented::SegmentedFactor;
@@ -82,7 +83,7 @@ impl InstrumentedProblem {
         Ok(self)
     }
 
-    /// Sets columns to hold at their fallback values: see [`LinearProblem::with_unexcited`].
+    /// Sets columns to hold at their fallback values, like [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
     /// As [`LinearProblem::with_unexcited`].
@@ -131,7 +132,7 @@ impl InstrumentedProblem {
         Ok(problem)
     }
 
-    /// `θ` of the regressor's columns as a vector over instruments and regressor.
+    /// Vector over instruments and regressor, with θ in the columns of the regressor and zeros for the instruments.
     pub(crate) fn over_both(&self, theta: &[f64]) -> Vec<f64> {
         let mut both = vec![0.0; self.names.len()];
         both.extend_from_slice(theta);

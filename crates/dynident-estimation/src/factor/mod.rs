@@ -1,11 +1,11 @@
 //! **Triangular factors**: logs reduced to factors of bounded size, and the problems assembled from them.
 //!
-//! A [`TriangularFactor`] is sufficient for least squares on rows `[W | τ]`: `RᵀR = [W | τ]ᵀ[W | τ]`. The rows of one
-//! joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive time segments for
-//! covariances from segments. The factors of all joints and logs over one list of named columns form a
-//! [`LinearProblem`] (an [`InstrumentedProblem`] with instruments), optionally with a [`Prior`]. [`RankSettings`]
-//! define when a column is excited, a [`RankReport`] lists the decisions; [`unexcited_columns`] compares columns with
-//! the noise of the motion. A [`RecursiveFactor`] takes samples one at a time.
+//! A [`TriangularFactor`] R replaces the rows `[W | τ]` of regressor and torque in least squares: `RᵀR = [W | τ]ᵀ[W |
+//! τ]`. The rows of one joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive
+//! time segments for covariances from segments. The factors of all joints and logs over one list of named columns
+//! form a [`LinearProblem`] (an [`InstrumentedProblem`] with instruments), optionally with a [`Prior`].
+//! [`RankSettings`] define when a column is excited, and a [`RankReport`] lists the decisions. [`unexcited_columns`]
+//! compares columns with the noise of the motion. A [`RecursiveFactor`] takes samples one at a time.
 
 mod excitation;
 mod instrumented;

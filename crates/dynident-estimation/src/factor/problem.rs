@@ -11,17 +11,17 @@ use rayon::prelude::*;
 /// The rows of one joint in one log.
 #[derive(Clone, Debug)]
 pub struct JointRows {
-    /// Number of the log in [`LinearProblem::logs`].
+    /// Index of the log in [`LinearProblem::logs`].
     pub log: usize,
-    /// Number of the joint in [`LinearProblem::joints`].
+    /// Index of the joint in [`LinearProblem::joints`].
     pub joint: usize,
-    /// For every column of the factor its number in the problem.
+    /// For every column of the factor, its index in the problem.
     pub columns: Vec<usize>,
     /// The reduced rows.
     pub factor: SegmentedFactor,
 }
 
-/// Gaussian prior of the parameters: `S θ = S m + N(0, 1)`, i.e. mean m and information SᵀS.
+/// Gaussian prior of the parameters θ: `S θ = S m + N(0, 1)` with mean m and information matrix SᵀS.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     mean: Vec<f64>,
@@ -67,8 +67,8 @@ impl LinearProblem {
         }
     }
 
-    /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
-    /// its number in the problem. Add the joints of one log under the same log name.
+    /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives the index in the problem for
+    /// every column of the factor. Add the joints of one log under the same log name.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a joint out of range or a wrong length of `columns`;
@@ -200,7 +200,7 @@ impl LinearProblem {
         self.prior.as_ref()
     }
 
-    /// N_j: rows of every joint over all logs.
+    /// N_j: number of rows of every joint over all logs.
     pub fn joint_rows(&self) -> Vec<usize> {
         let mut rows = vec![0; self.joints.len()];
         for equation in &self.equations {
@@ -230,9 +230,10 @@ impl LinearProblem {
         self.stacked().combined(weights)
     }
 
-    /// As [`combined`](Self::combined), with each [unexcited](Self::with_unexcited) column replaced by the part that
-    /// the other columns explain, `W_H` by `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and a silent column by zero. The factor keeps the
-    /// information about identifiable combinations that include held parameters, and drops the information from noise.
+    /// Like [`combined`](Self::combined), but replaces each [unexcited](Self::with_unexcited) column by the part that
+    /// the other columns explain: `W_H` by `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and a column with noise only by zero. The factor
+    /// keeps the information about identifiable combinations that include held parameters, and drops the information
+    /// from noise.
     ///
     /// # Errors
     /// As [`combined`](Self::combined); [`EstimationError::Overflow`] if the other columns are dependent.
@@ -368,7 +369,7 @@ impl Prior {
         &self.mean
     }
 
-    /// S, shape (any, columns).
+    /// S, the square root of the information matrix, shape (any, columns).
     pub fn sqrt_information(&self) -> &DMatrix<f64> {
         &self.sqrt_information
     }

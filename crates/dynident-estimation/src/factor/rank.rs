@@ -18,7 +18,7 @@ pub struct RankSettings {
     /// excites.
     pub tolerance: f64,
     /// A column is treated as zero if its norm is at most this share of the largest column norm. Default 1e-12: only
-    /// rounding noise is that small; units of parameters never differ that much.
+    /// rounding noise is that small; the norms of columns with different units differ much less.
     pub negligible_column: f64,
 }
 
@@ -42,10 +42,10 @@ impl RankSettings {
     }
 }
 
-/// A column that the data do not distinguish from earlier columns.
+/// A column that is not estimated, because the data do not distinguish it from earlier columns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FixedColumn {
-    /// Its number.
+    /// Its index.
     pub column: usize,
     /// Its name.
     pub name: String,
@@ -54,13 +54,13 @@ pub struct FixedColumn {
     /// True if the column differs from a combination of other columns only by noise of the motion; false if it is
     /// exactly such a combination or zero.
     pub noise: bool,
-    /// Sensitivity of the value of every column to that of this column, `∂θ/∂value`: an estimate with a nonzero
-    /// sensitivity is correct only if this value is. Zero for columns that do not depend on it.
+    /// Sensitivity of the value of every column to the value of this column, `∂θ/∂value`. An estimate with a nonzero
+    /// sensitivity is correct only if the fixed value is correct. Zero for columns that do not depend on it.
     #[serde(skip)]
     pub answers: Vec<f64>,
 }
 
-/// Rank decisions and the numbers behind them.
+/// Rank decisions, and the figures on which they are based.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankReport {
     /// Number of estimated columns.
@@ -74,13 +74,13 @@ pub struct RankReport {
     pub singular_values: Vec<f64>,
     /// Number of singular values above `tolerance` times the largest: a cross-check of `rank`.
     pub numerical_rank: usize,
-    /// The settings' tolerance.
+    /// Tolerance of the settings.
     pub tolerance: f64,
-    /// Smallest independent share of a column that was accepted as independent.
+    /// Smallest independent share among the columns that were accepted as independent.
     pub weakest_independent: f64,
-    /// Largest independent share of a column that was called dependent (0 without dependent columns).
+    /// Largest independent share among the columns that were rejected as dependent (0 without dependent columns).
     pub strongest_dependent: f64,
-    /// Largest over smallest singular value of the estimated columns, unscaled; depends on units.
+    /// Ratio of the largest to the smallest singular value of the estimated columns, unscaled; depends on units.
     pub condition_number_raw: f64,
     /// Condition number after each column was divided by its norm.
     pub condition_number_scaled: f64,
@@ -92,7 +92,7 @@ pub(crate) struct Split {
     fixed: Vec<usize>,
     /// Fixed columns that differ from the others only by noise.
     noise: Vec<usize>,
-    /// Fixed columns that contain only noise: no other column depends on them.
+    /// Fixed columns with noise only: no other column depends on them.
     silent: Vec<usize>,
     weakest_independent: f64,
     strongest_dependent: f64,
@@ -106,7 +106,7 @@ pub(crate) struct Solution {
     pub(crate) inverse: DMatrix<f64>,
 }
 
-/// Column norms; a negligible norm is replaced by the largest, so that the scaled column stays negligible.
+/// Column norms. A negligible norm is replaced by the largest norm, so that the scaled column stays negligible.
 fn scales(triangle: &TriangularFactor, settings: &RankSettings) -> Vec<f64> {
     let norms = triangle.column_norms();
     let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -173,7 +173,7 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
     solved_values(triangle, split, settings, fallback).with_inverse()
 }
 
-/// [`solve`] without the inverse.
+/// Like [`solve`], without the inverse.
 pub(crate) fn solved_values(
     triangle: &TriangularFactor,
     split: &Split,

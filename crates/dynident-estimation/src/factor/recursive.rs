@@ -1,8 +1,8 @@
 //! A triangular factor that is updated with the few rows of one sample, for recursive estimation.
 //!
-//! `reflect.rs` reduces a block of hundreds of rows with registers along the rows. A sample has one row per joint, so
-//! here the registers lie along the columns. Reflector k, `v = (ν, a)` with the entries `a` of the rows in column k,
-//! is applied to all columns from k on at once,
+//! `reflect.rs` reduces a block of hundreds of rows, with each SIMD register along the rows. A sample has one row per
+//! joint only, so here each register lies along the columns. Reflector k, `v = (ν, a)` with the entries `a` of the
+//! rows in column k, is applied to all columns from k on at once,
 //!
 //! ```text
 //!     t_j = β (ν R_kj + Σ_m a_m A_mj),   R_kj −= ν t_j,   A_mj −= a_m t_j,
@@ -22,8 +22,8 @@ const REFLECTORS: usize = 2;
 
 /// The upper triangular R of all rows `[W | τ]` so far; each sample adds one row per joint.
 ///
-/// Equal to a [`TriangularFactor`] up to rounding, but cheap to update with a sample: at most 2·rows·(columns + 1)²
-/// operations, less for rows that begin late, and no allocation.
+/// Equals a [`TriangularFactor`] up to rounding, but an update with one sample is cheap: at most 2·rows·(columns +
+/// 1)² operations, fewer for rows whose first columns are zero, and no allocation.
 ///
 /// ```
 /// use dynident_estimation::RecursiveFactor;
@@ -67,7 +67,7 @@ impl RecursiveFactor {
         Self::with_level(columns, begins, Level::detect())
     }
 
-    /// [`new`](Self::new) at a chosen processor level.
+    /// Like [`new`](Self::new), at a chosen processor level.
     pub fn with_level(columns: usize, begins: &[usize], level: Level) -> Self {
         let mut order: Vec<usize> = (0..begins.len()).collect();
         order.sort_by_key(|&row| begins[row]);
@@ -89,12 +89,12 @@ impl RecursiveFactor {
         }
     }
 
-    /// Regressor columns (without the torque).
+    /// Number of regressor columns (without the torque).
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Samples absorbed so far.
+    /// Number of samples absorbed so far.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -199,7 +199,7 @@ impl RecursiveFactor {
         })
     }
 
-    /// The entries of R and its torque, row by row from the diagonal, for storage.
+    /// The entries of R (including the torque column) row by row from the diagonal, for storage.
     pub fn entries(&self) -> Vec<f64> {
         (0..=self.columns)
             .flat_map(|row| (row..=self.columns).map(move |column| (row, column)))
@@ -207,7 +207,7 @@ impl RecursiveFactor {
             .collect()
     }
 
-    /// Continues from stored [`entries`](Self::entries) of this number of samples, bit by bit.
+    /// Continues from stored [`entries`](Self::entries) of `samples` samples; the result is bit-identical.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] if the number of entries differs.
@@ -273,7 +273,7 @@ impl Kernel for FindUnusable<'_> {
     }
 }
 
-/// Reflects up to eight rows into the triangle and clears them for the next sample.
+/// Reflects at most eight rows into the triangle and clears them for the next sample.
 struct TriangleOnRows<'a> {
     triangle: &'a mut [Chunk],
     size: usize,

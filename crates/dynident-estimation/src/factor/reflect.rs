@@ -90,7 +90,7 @@ struct Block<'a> {
     height: usize,
 }
 
-/// `V` reflectors `I - β v vᵀ` under construction. Their parts `ν` lie in different rows of the triangle, so the
+/// `V` reflectors `I - β v vᵀ` under construction. Their parts `ν` are in different rows of the triangle, so the
 /// inner product of two reflectors is that of their panel columns.
 struct Reflectors<const V: usize> {
     /// Part ν of each reflector in its row of the triangle.

@@ -48,13 +48,13 @@ impl SegmentSettings {
     }
 }
 
-/// Maximum number of unreduced rows of a segment. One large block is reduced faster than several small ones. Needs
-/// six times the memory of the factor.
+/// Maximum number of unreduced rows of a segment. One large block is reduced faster than several small ones. The rows
+/// need six times the memory of the factor.
 const fn most_rows(columns: usize) -> usize {
     3 * (columns + 1)
 }
 
-/// One segment: its rows while they are few, then their factor.
+/// One segment: its rows as long as there are few, then their factor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Segment {
     /// By rows, columns + 1 numbers each.
@@ -140,22 +140,23 @@ impl SegmentedFactor {
         self.length_rows
     }
 
-    /// Regressor columns (without the torque).
+    /// Number of regressor columns (without the torque).
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Rows absorbed so far.
+    /// Number of rows absorbed so far.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Rows in every segment, in order of time.
+    /// Number of rows in every segment, in order of time.
     pub fn segment_rows(&self) -> Vec<usize> {
         self.segments.iter().map(|segment| segment.rows(self.columns)).collect()
     }
 
-    /// Absorbs the next `rows` rows of the log in order of time, column by column as in [`TriangularFactor::absorb`].
+    /// Absorbs the next `rows` rows of the log in order of time, given column by column as in
+    /// [`TriangularFactor::absorb`].
     ///
     /// # Errors
     /// As [`TriangularFactor::absorb`]; on error nothing is absorbed.
@@ -244,8 +245,8 @@ impl SegmentedFactor {
     }
 
     /// The rows `[W | τ] C` in the same segments. C has shape (columns + 1, new columns + 1); its last column gives
-    /// the torque. Use this for a load with combined columns, a torque minus a known part or another unit of a joint,
-    /// without a second pass over the log.
+    /// the torque. Use this, without a second pass over the log, for a payload with combined columns, to subtract a
+    /// known part of the torque, or to change the unit of a joint.
     ///
     /// ```
     /// use dynident_estimation::{SegmentSettings, SegmentedFactor};

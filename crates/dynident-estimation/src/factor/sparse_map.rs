@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Nonzero entries of C by column. C selects, adds and scales columns, so most entries are zero.
 pub(super) struct SparseMap {
-    /// Rows of C: old columns and the torque.
+    /// Number of rows of C: old columns and the torque.
     size: usize,
     /// For every new column the old columns with their weights; the torque last.
     of_columns: Vec<Vec<(usize, f64)>>,

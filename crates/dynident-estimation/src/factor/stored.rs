@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FactorShape {
-    /// Regressor columns (without the torque).
+    /// Number of regressor columns (without the torque).
     pub columns: usize,
     /// Maximum number of segments.
     pub max_segments: usize,
-    /// Rows of a full segment.
+    /// Number of rows of a full segment.
     pub segment_length_rows: usize,
     /// The segments, in order of time.
     pub segments: Vec<SegmentShape>,
@@ -31,7 +31,7 @@ pub struct SegmentShape {
 }
 
 impl FactorShape {
-    /// Count of numbers of all segments; `None` on overflow.
+    /// Number of stored values of all segments; `None` on overflow.
     pub fn count(&self) -> Option<usize> {
         let size = self.columns.checked_add(1)?;
         self.segments.iter().try_fold(0_usize, |sum, segment| sum.checked_add(segment.count(size)?))
@@ -39,7 +39,7 @@ impl FactorShape {
 }
 
 impl SegmentShape {
-    /// Count of its numbers with `size` columns including the torque.
+    /// Number of stored values of this segment with `size` columns including the torque.
     fn count(self, size: usize) -> Option<usize> {
         if self.is_triangle {
             size.checked_mul(size.checked_add(1)?).map(|twice| twice / 2)
@@ -65,8 +65,8 @@ impl SegmentedFactor {
         }
     }
 
-    /// Complete content: for every segment in order of time the packed triangle of `[W | τ]`, or its rows while they
-    /// are few.
+    /// Complete content: for every segment in order of time the packed triangle of `[W | τ]`, or its rows if they are
+    /// not yet reduced.
     ///
     /// ```
     /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -84,7 +84,7 @@ impl SegmentedFactor {
         self.segments().iter().flat_map(of).collect()
     }
 
-    /// Restores the factor from its [`shape`](Self::shape) and [`numbers`](Self::numbers), bit by bit.
+    /// Restores the factor from its [`shape`](Self::shape) and [`numbers`](Self::numbers), bit-identically.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a wrong count of numbers or segments; [`EstimationError::Unusable`] for an
@@ -137,7 +137,7 @@ impl SegmentedFactor {
     }
 }
 
-/// The factor of `rows` rows with this packed triangle.
+/// Creates a factor of `rows` rows from its packed triangle.
 fn triangular(columns: usize, rows: usize, packed: &[f64]) -> Result<TriangularFactor, EstimationError> {
     let size = columns + 1;
     for row in 0..size {

@@ -14,7 +14,8 @@ pub const BLOCK_ROWS: usize = 256;
 /// The largest magnitude that can be squared and summed without overflow.
 pub(crate) const MAX_MAGNITUDE: f64 = 1.0e140;
 
-/// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`.
+/// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`, with
+/// regressor W and torque τ.
 ///
 /// ```text
 ///     R = [ R_W  r ]    R_Wᵀ R_W = WᵀW,  R_Wᵀ r = Wᵀτ,
@@ -44,7 +45,7 @@ pub(crate) const MAX_MAGNITUDE: f64 = 1.0e140;
 pub struct TriangularFactor {
     columns: usize,
     rows: usize,
-    /// Packed by rows, size columns + 1.
+    /// Packed by rows; the size is columns + 1.
     triangle: Vec<f64>,
 }
 
@@ -107,12 +108,12 @@ impl TriangularFactor {
         Self { columns, rows, triangle: triangle.map(|(row, column)| entry(row, column)).collect() }
     }
 
-    /// Regressor columns (without the torque).
+    /// Number of regressor columns (without the torque).
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Rows absorbed so far, N.
+    /// N, the number of rows absorbed so far.
     pub fn rows(&self) -> usize {
         self.rows
     }
@@ -146,7 +147,7 @@ impl TriangularFactor {
         self.absorb_with(&mut FactorWorkspace::default(), panel, rows)
     }
 
-    /// [`absorb`](Self::absorb) without allocation once the workspace is large enough.
+    /// Like [`absorb`](Self::absorb), without allocation once the workspace is large enough.
     ///
     /// # Errors
     /// As [`absorb`](Self::absorb).
@@ -257,7 +258,7 @@ impl TriangularFactor {
         self.merge_with(&mut FactorWorkspace::default(), other)
     }
 
-    /// [`merge`](Self::merge) without allocation once the workspace is large enough.
+    /// Like [`merge`](Self::merge), without allocation once the workspace is large enough.
     ///
     /// # Errors
     /// As [`merge`](Self::merge).
@@ -267,7 +268,7 @@ impl TriangularFactor {
         Ok(())
     }
 
-    /// [`merge`](Self::merge) without the check of columns.
+    /// Like [`merge`](Self::merge), without the check of columns.
     pub(crate) fn absorb_factor(&mut self, workspace: &mut FactorWorkspace, other: &Self) {
         if self.rows == 0 {
             self.clone_from(other);
@@ -309,8 +310,8 @@ impl TriangularFactor {
         Ok(scaled)
     }
 
-    /// The factor of the same rows with the first `columns` columns and, as torque, the weighted sum of the remaining
-    /// ones: several torques of one motion from one pass over its rows.
+    /// The factor of the same rows with the first `columns` columns. Its torque is the weighted sum of the remaining
+    /// columns: several torques of one motion need only one pass over its rows.
     ///
     /// ```
     /// use dynident_estimation::TriangularFactor;

@@ -1,4 +1,4 @@
-//! Columns that the data do not excite, and the effect of their held values.
+//! Columns that the data do not excite, and the sensitivity of the estimate to their held values.
 
 use crate::error::EstimationError;
 use nalgebra::DMatrix;
@@ -6,21 +6,22 @@ use nalgebra::DMatrix;
 /// Columns that the data do not excite.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unexcited {
-    /// All of them, ascending: only noise and combinations of other columns.
+    /// All unexcited columns, ascending: they contain only noise and combinations of other columns.
     pub columns: Vec<usize>,
-    /// The subset without any combination of other columns above the noise (only noise). Ascending.
+    /// The unexcited columns with noise only, ascending: combinations of other columns are not above the noise.
     pub silent: Vec<usize>,
 }
 
 impl Unexcited {
-    /// The same columns with new numbers; columns without a new number are dropped.
+    /// The same columns with new indices; columns without a new index are dropped.
     pub fn renumbered(&self, number: impl Fn(usize) -> Option<usize>) -> Self {
         let of = |columns: &[usize]| columns.iter().filter_map(|&column| number(column)).collect();
         Self { columns: of(&self.columns), silent: of(&self.silent) }
     }
 }
 
-/// Sensitivity of the estimated columns to the held ones: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free, held).
+/// Sensitivity of the estimated columns F to the held columns H: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free,
+/// held).
 pub(crate) fn answer_of_free(
     triangle: &DMatrix<f64>,
     free: &[usize],

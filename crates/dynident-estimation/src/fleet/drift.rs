@@ -18,15 +18,15 @@ const MIN_ESTIMATES: usize = 3;
 /// Drift of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ParameterDrift {
-    /// Change of the parameter for each unit of time, b.
+    /// b: change of the parameter per unit of time.
     pub slope: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the slope.
     pub slope_std: f64,
-    /// Half-width of its 95 % interval.
+    /// Half-width of the 95 % interval of the slope.
     pub half_width_95: f64,
-    /// Variance of the estimates about the line relative to their error bars, c.
+    /// c: variance of the estimates about the line relative to their error bars.
     pub scatter: f64,
-    /// Probability of at least this slope for a constant parameter.
+    /// p-value: probability of at least this slope if the parameter is constant.
     pub tail: f64,
     /// Whether the parameter drifts: `tail` is below the false-alarm rate, corrected for the number of parameters.
     pub drifts: bool,
@@ -35,7 +35,7 @@ pub struct ParameterDrift {
 /// Drift of one robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Drift {
-    /// One per parameter; `None` if too few estimates contain it, or all at the same time.
+    /// One entry per parameter; `None` if too few estimates contain it, or if all estimates have the same time.
     pub parameters: Vec<Option<ParameterDrift>>,
 }
 

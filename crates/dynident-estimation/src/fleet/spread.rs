@@ -23,11 +23,11 @@ const MIN_ROBOTS: usize = 3;
 pub struct ParameterSpread {
     /// Mean μ of the fleet.
     pub mean: f64,
-    /// Standard deviation of that mean.
+    /// Standard deviation of `mean`.
     pub mean_std: f64,
     /// Standard deviation τ between robots, in addition to the error bars.
     pub between_std: f64,
-    /// Probability of at least this spread for equal robots.
+    /// p-value: probability of at least this spread if all robots are equal.
     pub tail: f64,
     /// Whether robots differ: `tail` is below the false-alarm rate, corrected for the number of parameters.
     pub differs: bool,
@@ -40,11 +40,12 @@ pub struct ParameterSpread {
 pub struct MemberDeviation {
     /// Name of the member.
     pub name: String,
-    /// `t` of every parameter; `None` if it was not estimated for this robot or for too few others.
+    /// Deviation t of every parameter in standard deviations; `None` if it was not estimated for this robot or for
+    /// too few others.
     pub deviation: Vec<Option<f64>>,
-    /// Most deviating parameter; `None` without a comparison.
+    /// Index of the most deviating parameter; `None` without a comparison.
     pub worst: Option<usize>,
-    /// Probability that any parameter of an equal robot deviates at least as much.
+    /// p-value: probability that any parameter of an equal robot deviates at least as much.
     pub tail: f64,
     /// Whether the robot differs from the others: `tail` is below the false-alarm rate, corrected for the number of
     /// robots.
@@ -54,9 +55,9 @@ pub struct MemberDeviation {
 /// Result for a fleet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// One per parameter; `None` if too few robots have it.
+    /// One entry per parameter; `None` if too few robots have it.
     pub parameters: Vec<Option<ParameterSpread>>,
-    /// One for each robot, in the order given.
+    /// One entry per robot, in the order given.
     pub members: Vec<MemberDeviation>,
 }
 

@@ -1,4 +1,5 @@
-//! Separates motion from noise in the fast part of a measured motion: torque follows only motion.
+//! Separates motion from noise in the high-frequency part of a measured motion: the torque contains only the effect
+//! of the motion.
 
 use super::instrumental::InstrumentalEstimate;
 use super::projection::Projection;
@@ -13,22 +14,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FastMotion {
-    /// κ: 1 if this part is motion, 0 if it is noise.
+    /// κ: 1 if this part is real motion, 0 if it is position noise.
     pub followed: f64,
     /// Half-width of its 95 % interval, from time segments.
     pub half_width_95: f64,
-    /// RMS of the torque that this part needs relative to that of the whole motion, joints in units of their noise.
+    /// RMS of the torque of this part relative to that of the whole motion, with each joint scaled by its noise.
     pub share_of_torque: f64,
 }
 
 /// `κ = argmin Σ_j ‖τ_j - W̃_j θ - κ V_j θ‖² / σ_j²`, with `W = W̃ + V`, `W̃ = Z(ZᵀZ)⁻¹ZᵀW` and θ the instrumental
 /// estimate.
 ///
-/// κ is one number for the whole remainder of instruments with a lower bandwidth. Fast motion needs torque (κ = 1),
-/// position noise does not (κ = 0); in between κ is the share of motion. If only the model is wrong in fast motion,
-/// the torque still follows most of it. So κ distinguishes noise from a wrong model, which the Durbin-Wu-Hausman test
-/// ([`hausman_test`](crate::hausman_test)) cannot: it rejects for either. κ needs two time segments only, for any
-/// number of parameters.
+/// κ is one number for the whole part V of the regressor that instruments of a lower bandwidth do not explain. Real
+/// fast motion needs torque (κ = 1), position noise does not (κ = 0); between 0 and 1, κ is the share of motion. If
+/// only the model is wrong in fast motion, the torque still follows most of the motion. So κ distinguishes noise from
+/// a wrong model. The Durbin-Wu-Hausman test ([`hausman_test`](crate::hausman_test)) rejects for either. κ needs only
+/// two time segments, for any number of parameters.
 ///
 /// `None` if the instruments explain the whole regressor or if the rows do not determine κ.
 ///

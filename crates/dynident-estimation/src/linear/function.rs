@@ -1,4 +1,4 @@
-//! Custom estimators: a caller's rule that computes values from the rows `[W | τ]`.
+//! Custom estimators: a function of the caller computes values from the rows `[W | τ]`.
 
 use super::ordinary::OrdinarySettings;
 use super::weighted::{WeightedSettings, weighted_values};
@@ -7,7 +7,7 @@ use crate::factor::{LinearProblem, Solution, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom, student_half_width};
 use nalgebra::{DMatrix, DVector};
 
-/// Input of a custom estimator: the rows of every joint, reduced to the number of columns plus one.
+/// Input of a custom estimator: the rows of every joint, reduced to as many rows as columns plus one.
 ///
 /// The rows are the triangular factors: for each joint and every θ, `‖τ - W θ‖²` and `Wᵀ(τ - W θ)` are equal to those
 /// over all samples. Unexcited columns are excluded; their torque at the fallback values is subtracted from τ.
@@ -25,7 +25,7 @@ pub struct EstimatorRows {
     pub joint_of_row: Vec<usize>,
     /// Number of samples per joint before the reduction.
     pub samples: Vec<usize>,
-    /// Noise of each joint by weighted least squares, Nm (N): `1/σ_j` whitens its rows.
+    /// Noise σ_j of each joint by weighted least squares, Nm (N). Rows divided by σ_j have unit noise.
     pub joint_sigma: Vec<f64>,
 }
 

@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, DVector};
 /// Rows of all joints in one table: one row `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` per instant of a log, stored as
 /// factors.
 ///
-/// The triangle of such rows contains all products `W_iᵀW_j`, so any covariance across joints can be applied without
-/// another pass over the rows. Its width is that of all joints together: for a seven-joint arm absorbing rows costs
-/// about seven times as much as with separate factors.
+/// The triangle of such rows contains all products `W_iᵀW_j`, so any covariance between joints can be applied without
+/// another pass over the rows. The triangle has the columns of all joints: for a seven-joint arm, absorbing rows
+/// takes about seven times as long as with separate factors.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -43,8 +43,8 @@ pub struct CrossProblem {
 /// Result of [`generalized_least_squares`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneralizedEstimate {
-    /// Values with covariance. Clusters are segments of all joints; score inflation, effective and segment correlation
-    /// are for all joints together.
+    /// Values with covariance. A cluster is one time segment of all joints. The score inflation and the two segment
+    /// correlations of the estimate refer to all joints together.
     pub estimate: Estimate,
     /// Ω, covariance of the joints' errors at one instant, (joints, joints), squared torque.
     pub noise_covariance: DMatrix<f64>,
@@ -86,13 +86,13 @@ impl CrossProblem {
         })
     }
 
-    /// Columns of a log's factor: those of all joints and the torques of all joints but the last.
+    /// Number of columns of a log's factor: columns of all joints and torques of all joints except the last.
     pub fn width(&self) -> usize {
         self.joint_columns.iter().map(|list| list.len() + 1).sum::<usize>().saturating_sub(1)
     }
 
-    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]` in order of time, the columns of each joint in the order of its
-    /// list.
+    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]` in order of time, with the columns of each joint in the order given
+    /// to `new`.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] if the factor has another [`width`](Self::width).
@@ -112,7 +112,7 @@ impl CrossProblem {
         Ok(self)
     }
 
-    /// Sets columns to hold at their fallback values: see [`LinearProblem::with_unexcited`].
+    /// Sets columns to hold at their fallback values, like [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
     /// As [`LinearProblem::with_unexcited`].
@@ -136,7 +136,7 @@ impl CrossProblem {
         self.joint_columns.iter().map(&mut start).collect()
     }
 
-    /// `EᵀE` of the residuals `E = [τ_1 − W_1 θ, …]`, and every joint's `‖τ‖²`.
+    /// `EᵀE` of the residuals `E = [τ_1 − W_1 θ, …]`, and `‖τ_j‖²` of every joint j.
     fn residual_products(&self, theta: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
         let (size, joints) = (self.width() + 1, self.joints.len());
         let mut choice = DMatrix::zeros(size, joints);
@@ -186,11 +186,12 @@ impl CrossProblem {
     }
 }
 
-/// Limit of the correlation of two joints' errors. Above it the whitener divides by the rounding of their difference.
+/// Limit of the correlation of two joints' errors. Above it the whitening would amplify the rounding of their
+/// difference.
 const MAX_CORRELATION: f64 = 1.0 - 1.0e-9;
 
-/// `θ = argmin Σ_t e_tᵀ Ω⁻¹ e_t`, `e_t = τ_t − W_t θ` over all joints at instant t, `Ω = Σ_t e_t e_tᵀ / (N − p/n)`
-/// iterated from the unit matrix to convergence; p estimated columns, n joints, N instants.
+/// Solves `θ = argmin Σ_t e_tᵀ Ω⁻¹ e_t`. `e_t = τ_t − W_t θ` is the error of all joints at instant t. `Ω = Σ_t e_t
+/// e_tᵀ / (N − p/n)` is iterated from the unit matrix to convergence; p estimated columns, n joints, N instants.
 ///
 /// With `Ω = L Lᵀ` the rows are multiplied by L⁻¹, without another pass over the log. The white covariance is `(Σ
 /// W_tᵀΩ⁻¹W_t)⁻¹`; for the covariance from segments a cluster is a segment of all joints. Zellner, J. Am. Stat. Assoc.

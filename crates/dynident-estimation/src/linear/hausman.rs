@@ -1,5 +1,5 @@
-//! Augmented Durbin-Wu-Hausman test of least squares against instrumental variables: does filtering remove enough
-//! noise?
+//! Augmented Durbin-Wu-Hausman test of least squares against instrumental variables. It shows whether filtering
+//! removes enough noise from the regressor.
 
 use super::instrumental::{InstrumentalEstimate, noisy_columns};
 use super::projection::Projection;
@@ -16,11 +16,11 @@ use serde::{Deserialize, Serialize};
 pub struct HausmanSettings {
     /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// Covariance of the test; from time segments by default. With `white`, the textbook form, coloured residuals
-    /// cause far too many rejections.
+    /// Covariance of the test; from time segments by default. With `white`, the textbook form, residuals that are
+    /// correlated in time cause far too many rejections.
     pub covariance: CovarianceMethod,
-    /// Probability of rejecting least squares when it is correct. Default 0.01: with large samples even small
-    /// deviations are significant.
+    /// Significance level: probability of rejecting least squares although it is correct. Default 0.01, because with
+    /// large samples even small deviations are significant.
     pub level: f64,
 }
 
@@ -62,9 +62,10 @@ pub struct HausmanTest {
     pub verdict: HausmanVerdict,
     /// F statistic; `None` if undecided.
     pub f: Option<f64>,
-    /// Degrees of freedom: tested columns; time segments (rows for white residuals) minus tested columns.
+    /// Degrees of freedom: number of tested columns; number of time segments (rows for white residuals) minus tested
+    /// columns.
     pub degrees_of_freedom: [f64; 2],
-    /// Probability of a larger F if least squares is correct.
+    /// p-value: probability of a larger F if least squares is correct.
     pub p_value: Option<f64>,
     /// Tested columns with `t = γ/std(γ)`; large values show where the noise is.
     pub columns: Vec<HausmanColumn>,
@@ -80,7 +81,7 @@ pub struct HausmanColumn {
     pub name: String,
     /// γ: difference between the coefficients of the column's noise and of its motion.
     pub contrast: f64,
-    /// γ over its standard deviation.
+    /// γ divided by its standard deviation.
     pub t: f64,
 }
 
@@ -161,7 +162,7 @@ struct Tested {
     names: Vec<String>,
 }
 
-/// The test on a fit of `[W | V]` with `degrees` degrees of freedom.
+/// Evaluates the test on a fit of `[W | V]` with `degrees` degrees of freedom.
 fn judged(fit: &Estimate, tested: &Tested, degrees: usize, level: f64) -> HausmanTest {
     let Tested { columns: tested, names } = tested;
     let q = tested.len();

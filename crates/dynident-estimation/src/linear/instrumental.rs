@@ -58,13 +58,13 @@ impl InstrumentalSettings {
 pub struct InstrumentReport {
     /// Number of independent instruments.
     pub instruments: usize,
-    /// Columns with noise that the instruments do not share. The other columns are explained completely and are their
-    /// own instruments.
+    /// Columns that contain noise which the instruments do not explain. All other columns are explained completely
+    /// and are their own instruments.
     pub noisy_columns: Vec<String>,
     /// Smallest first-stage F over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k` with
-    /// `Σ_V = VᵀV/(N − k)`, other columns projected out. `None` without noisy columns.
+    /// `Σ_V = VᵀV/(N − k)`, k instruments, N rows, other columns projected out. `None` without noisy columns.
     pub weakest_f: Option<f64>,
-    /// The noisy column with the largest component in that direction, in units of its noise.
+    /// The noisy column with the largest component in the direction of the smallest F, in units of its noise.
     pub weakest_column: Option<String>,
     /// Whether the smallest F is below the limit: the estimate is then biased towards least squares and its error bars
     /// are too small.
@@ -76,7 +76,7 @@ pub struct InstrumentReport {
 pub struct InstrumentalEstimate {
     /// Values with covariance; `joint_sigma` is that of `τ − W θ`, including noise of W.
     pub estimate: Estimate,
-    /// The first stage.
+    /// Strength of the instruments in the first stage.
     pub instruments: InstrumentReport,
 }
 
@@ -86,10 +86,11 @@ pub(crate) const MIN_NOISE_SHARE: f64 = 1.0e-7;
 /// `θ = (Σ_j Z_jᵀW_j/σ_j²)⁻¹ Σ_j Z_jᵀτ_j/σ_j²`, with `σ_j² = ‖τ_j − W_j θ‖²/(N_j − p/n)` iterated from one as in
 /// weighted least squares.
 ///
-/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`. This is the same for
-/// equally many independent instruments and estimated columns, and two-stage least squares for more instruments.
-/// Consistent if Z is uncorrelated with the noise of W and τ, where least squares is biased towards zero. The
-/// covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ =
+/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`. With as many independent
+/// instruments as estimated columns, this equals the formula above. With more instruments it is two-stage least
+/// squares.
+/// The estimate is consistent if Z is uncorrelated with the noise of W and τ, whereas least squares is biased towards
+/// zero. The covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ =
 /// Z(ZᵀZ)⁻¹ZᵀW`, or its delete-one-segment form.
 ///
 /// For instruments simulated with the current model (IDIM-IV) repeat the call with new Z until θ converges. Janot,
@@ -130,8 +131,8 @@ pub fn instrumental_variables(
         iterations += 1;
     }
     let instruments = report(problem, &projection, &choice, settings);
-    // Least squares of τ − V θ on W̃ has the same solution and the residual τ − W θ, and so the sandwich of the
-    // instruments.
+    // Least squares of τ − V θ on W̃ has the same solution and the residual τ − W θ, and therefore the sandwich
+    // covariance of the instrumental estimate.
     let theta = DVector::from_column_slice(&solution.values);
     let second = problem.combined(problem.columns().to_vec(), problem.fallback().to_vec(), |local| {
         let (fitted, left) = projection.parts(local);

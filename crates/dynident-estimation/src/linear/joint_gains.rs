@@ -1,4 +1,4 @@
-//! Joint gains for torque in an unknown unit, estimated together with the parameters from a known load.
+//! Joint gains for torque signals in an unknown unit, estimated together with the parameters from a known payload.
 
 use super::ordinary::{OrdinarySettings, ordinary_least_squares};
 use super::weighted::{WeightedSettings, weighted_least_squares};
@@ -15,16 +15,18 @@ const MAX_STEPS: usize = 50;
 const STEP_TOLERANCE: f64 = 1.0e-4;
 /// Maximum number of halvings of a step before the iteration ends.
 const MAX_HALVINGS: usize = 12;
-/// Share of a gain's column, by its own norm, that must be in a dependence for the gain to be part of it.
+/// Minimum share of a gain's column, relative to its norm, in a dependence between columns for the gain to be part of
+/// it.
 const MIN_DEPENDENCE_SHARE: f64 = 1.0e-6;
 
-/// `u_j = (1/g_j) W_j (θ + c) + noise`: signal of joint j in its own unit, for parameters θ and a known load c in some
-/// of the logs.
+/// `u_j = (1/g_j) W_j (θ + c) + noise`: logged signal u_j of joint j in its own unit, with gain g_j, regressor W_j
+/// and parameters θ. c are the parameters of a known payload in some of the logs.
 #[derive(Clone, Debug)]
 pub struct GainProblem<'a> {
     /// Rows `[W | u]` over the columns θ.
     pub rows: &'a LinearProblem,
-    /// Known part of the parameters for every log, one value per column: the load in loaded logs, zero in others.
+    /// Known part c of the parameters for every log, one value per column: the payload in logs with payload, zero in
+    /// others.
     pub known: Vec<Vec<f64>>,
 }
 
@@ -35,11 +37,12 @@ pub struct JointGain {
     pub joint: String,
     /// Torque per unit of the logged signal, Nm (N); the held value if not identified.
     pub gain: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the gain.
     pub std: f64,
-    /// Half-width of its 95 % interval.
+    /// Half-width of the 95 % interval of the gain.
     pub half_width_95: f64,
-    /// False if any other gain of this joint fits equally well with other parameters: no known load acts on the joint.
+    /// False if any other gain of this joint fits equally well with other parameters, because no known payload acts
+    /// on the joint.
     pub identified: bool,
 }
 
@@ -55,15 +58,15 @@ pub struct GainEstimate {
 /// Estimates parameters and gains together, `min Σ_j ‖u_j − k_j W_j (θ + c)‖² / σ_j²` over θ and `k_j = 1/g_j`, by
 /// Gauss-Newton steps on the factors.
 ///
-/// The noisy signal u is the left side. With gains in front of u (`g_j u_j = W_j (θ + c)`) least squares biases the
-/// gains to zero; the usual remedy is total least squares (Gautier and Briot, ICRA 2012 and ASME J. Dyn. Sys. Meas.
-/// Control 136 (2014) 051025). Start: these linear equations with u replaced by its fit on its own log's columns,
-/// which noise does not bias. Every step is a weighted fit of the columns `k_j W_j` and `W_j (θ + c)`; the covariance
-/// is that of the last step.
+/// The noisy signal u is on the left side. With gains in front of u (`g_j u_j = W_j (θ + c)`) least squares biases
+/// the gains to zero; the usual remedy is total least squares (Gautier and Briot, ICRA 2012 and ASME J. Dyn. Sys.
+/// Meas. Control 136 (2014) 051025). The start values solve these linear equations with u replaced by its fit on the
+/// columns of its own log, which noise does not bias. Every step is a weighted fit of the columns `k_j W_j` and `W_j
+/// (θ + c)`; the covariance is that of the last step.
 ///
-/// A known load must act on the joint. Otherwise all gains and parameters of the joint (or of all joints that share
-/// parameters) can be multiplied by the same number. Such gains are not `identified` and are held at their start
-/// values.
+/// A known payload must act on the joint. Otherwise all gains and parameters of the joint (or of all joints that
+/// share parameters) can be multiplied by the same number. Such gains are not `identified` and are held at their
+/// start values.
 ///
 /// # Errors
 /// [`EstimationError::Mismatch`] for wrong shapes or a problem with a prior, [`EstimationError::Setting`] for a load
@@ -97,7 +100,7 @@ pub fn joint_gains(problem: &GainProblem<'_>, settings: &WeightedSettings) -> Re
             }
             share *= 0.5;
         }
-        // No smaller misfit along the step: converged to rounding.
+        // No smaller misfit along the step: the iteration has converged up to rounding.
         let Some((next, found)) = better else { break };
         settled = next.iter().zip(&x).zip(&step.std).all(|((a, b), std)| (a - b).abs() <= STEP_TOLERANCE * std);
         (x, misfit) = (next, found);
@@ -169,7 +172,8 @@ fn misfit(problem: &GainProblem<'_>, x: &[f64]) -> Result<f64, EstimationError> 
     Ok(terms.map(|((square, &torque), n)| n as f64 * square.max(floor(torque)).ln()).sum())
 }
 
-/// Columns `k W` for θ and `W (θ + c)` for k at x. The target is absolute, so that the solution is the next x.
+/// Columns `k W` for θ and `W (θ + c)` for k at x. The right-hand side is chosen so that the solution is the next x,
+/// not a change of x.
 fn linearised(
     problem: &GainProblem<'_>,
     merged: Option<&[SegmentedFactor]>,
@@ -198,7 +202,7 @@ fn linearised(
     Ok(linear)
 }
 
-/// `g_j û_j − W_j θ = W_j c` with û the fit of u on the columns of its own log.
+/// Start values from `g_j û_j − W_j θ = W_j c`, where û is the fit of u on the columns of its own log.
 fn start(
     problem: &GainProblem<'_>,
     merged: &[SegmentedFactor],
@@ -231,7 +235,7 @@ fn start(
         let columns = equation.columns.iter().copied().chain([count + equation.joint]).collect();
         linear.add(&rows.logs()[equation.log], equation.joint, columns, factor.mapped(&map)?)?;
     }
-    // Ordinary weights: for noise-free data the residuals are rounding and unusable as weights.
+    // Equal weights: with noise-free data the residuals are only rounding errors and unusable as weights.
     let ordinary = OrdinarySettings { rank: settings.rank, covariance: CovarianceMethod::White };
     let mut x = ordinary_least_squares(&linear, &ordinary)?.values;
     for (joint, gain) in x[count..].iter_mut().enumerate() {
@@ -244,7 +248,7 @@ fn start(
     Ok(x)
 }
 
-/// Which gains are part of a dependence between columns.
+/// Returns which gains are part of a dependence between columns, and therefore not identified.
 fn not_identified(
     last: &LinearProblem,
     estimate: &Estimate,

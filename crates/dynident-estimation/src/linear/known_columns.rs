@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, DVector};
 /// Known values of some columns, from other data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownColumns {
-    /// Their numbers among the problem's columns.
+    /// Indices of the known columns in the problem.
     pub columns: Vec<usize>,
-    /// Their values.
+    /// Known values of these columns.
     pub values: Vec<f64>,
     /// Covariance of the values in the same order; zero for exact values.
     pub covariance: DMatrix<f64>,
@@ -19,7 +19,8 @@ pub struct KnownColumns {
 
 /// Estimates the unknown columns: `θ_u = argmin Σ_j ‖τ_j − W_k θ_k − W_u θ_u‖² / σ_j²`.
 ///
-/// The data do not change the known values; their errors are included in the error bars of the other columns:
+/// The data do not change the known values; the errors of the known values are included in the error bars of the
+/// other columns:
 ///
 /// ```text
 ///     V_u = V_own + G V_k Gᵀ,   cov(θ_u, θ_k) = G V_k,
@@ -114,7 +115,8 @@ fn check(problem: &LinearProblem, known: &KnownColumns) -> Result<(), Estimation
     }
 }
 
-/// G, shape (free columns, known columns); zero rows for unexcited columns.
+/// G, the sensitivity of the free to the known columns, shape (free columns, known columns); zero rows for unexcited
+/// columns.
 fn sensitivity(
     problem: &LinearProblem,
     known: &KnownColumns,

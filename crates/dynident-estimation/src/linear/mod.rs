@@ -1,5 +1,5 @@
-//! **Estimators of `τ = W θ + noise`.** Each takes a problem and settings and returns an
-//! [`Estimate`](crate::Estimate), if needed in a struct with further results.
+//! **Estimators of `τ = W θ + noise`** with torque τ, regressor W and parameters θ. Each takes a problem and settings
+//! and returns an [`Estimate`](crate::Estimate), alone or in a struct with further results.
 //!
 //! | noise | function |
 //! | --- | --- |
@@ -10,10 +10,10 @@
 //! | a level that depends on the velocity | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
 //! | custom | [`estimate_by`] |
-//! | also in the columns | [`instrumental_variables`]; tests: [`hausman_test`] and [`fast_motion`] |
+//! | also in the columns of W | [`instrumental_variables`]; tests: [`hausman_test`] and [`fast_motion`] |
 //!
-//! Arguments are the problem, its settings and, for iterative reweighting of rows, a function that passes over the
-//! rows of the log. [`joint_gains`] estimates the torque constants of the drives from the same rows.
+//! Estimators that weight single rows also take a function that passes over the rows of the log. [`joint_gains`]
+//! estimates the torque constants of the drives from the same rows.
 
 mod fast_motion;
 mod function;

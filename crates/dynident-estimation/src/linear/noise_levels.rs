@@ -15,8 +15,8 @@ pub struct NoiseLevelSettings {
     /// has an uncertainty of about 10 % and follows changes that last longer than about fifty rows (slow and fast
     /// motion, slow reversals, brake release).
     pub window_rows: usize,
-    /// Share of the joint's mean square residual in the square of every level, 0 to 1. Default 1e-3: limits the level
-    /// to at least 1/30 of the mean. One gives weighted least squares.
+    /// Share of the joint's mean square residual in the square of every local level, 0 to 1. Default 1e-3: every
+    /// level is at least about 1/30 of the joint's RMS residual. With 1 the result is weighted least squares.
     pub pooled_share: f64,
     /// Criteria for an excited column.
     pub rank: RankSettings,
@@ -60,25 +60,27 @@ impl NoiseLevelSettings {
 /// Result of [`noise_weighted_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoiseWeightedEstimate {
-    /// Values with covariance. `joint_sigma` is the noise of rows at the mean level of their joint.
+    /// Values with covariance. `joint_sigma` is the noise of rows whose level is the mean level of their joint.
     pub estimate: Estimate,
     /// Smallest and largest noise level of each joint's rows, relative to the RMS of its residuals. If both are near
     /// one, weighted least squares is sufficient.
     pub level_range: Vec<[f64; 2]>,
 }
 
-/// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row
-/// k`, iterated with the residuals of the previous solution.
+/// Solves `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²` for joint j and row k with `σ_jk² = s σ_j² + (1 − s) · mean
+/// of r² over the window around row k`, where s is the pooled share. r are the residuals of the previous solution;
+/// the solution is iterated.
 ///
-/// Torque noise of a drive is larger at velocity and friction models are worse at reversals, so with one σ per joint
-/// the worst part dominates. Unlike Huber's and Tukey's weights, the weight depends on the residuals of the
-/// neighbourhood instead of the row's own, so for normal noise the efficiency loss is only that of the estimated
-/// level. After Han et al., "An iterative approach for accurate dynamic model identification", IEEE Trans. Ind.
-/// Electron. (2020); for estimated weights Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3
-/// and 3.
+/// Torque noise of a drive is larger at high velocity, and friction models are worse at reversals. With one σ per
+/// joint the worst part would dominate. Unlike Huber's and Tukey's weights, the weight of a row depends on the
+/// residuals of neighbouring rows and not on its own residual alone. For normal noise the efficiency loss is
+/// therefore only that of the estimated level. After Han et al., "An iterative approach for accurate dynamic model
+/// identification", IEEE Trans. Ind. Electron. (2020); for estimated weights Carroll and Ruppert, Transformation and
+/// Weighting in Regression (1988), 2.3 and 3.
 ///
 /// `pass` must give all rows of `problem` to its visitor at each call. Residuals are stored, one number per row;
-/// regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted rows, for given weights.
+/// regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted rows and treats the
+/// weights as known.
 ///
 /// # Errors
 /// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the
@@ -136,7 +138,7 @@ pub fn noise_weighted_least_squares<E: From<EstimationError>>(
     Err(EstimationError::Empty.into())
 }
 
-/// Noise levels relative to that of the joint, by equation and row.
+/// Noise levels of the rows relative to the level of their joint, by equation and row.
 struct Levels {
     relative: Vec<Vec<f64>>,
     ranges: Vec<[f64; 2]>,
@@ -188,7 +190,7 @@ fn window_means(residuals: &[f64], width: usize) -> Vec<f64> {
     (0..residuals.len()).map(mean).collect()
 }
 
-/// One pass: residuals of θ by equation, and factors of the rows divided by their levels.
+/// One pass over the rows: residuals of θ by equation, and factors of the rows divided by their levels.
 fn gathered<E: From<EstimationError>>(
     problem: &LinearProblem,
     theta: &[f64],

@@ -1,9 +1,9 @@
 //! Newton's step for the noise levels of weighted least squares.
 //!
-//! With `λ_j = 1/σ_j²` the solution `θ(λ)` has the residuals `S_j = ‖τ_j − W_j θ‖²`, and the noise has converged when
-//! `F_j = ln λ_j + ln(S_j / d_j) = 0` for the degrees of freedom `d_j`. The fixed-point iteration `ln λ ← ln λ − F`
-//! gains a factor of two to four per step. Newton's step uses the derivative: with the scores `g_j = W_jᵀ(τ_j − W_j
-//! θ)` and the information `A = Σ λ_j W_jᵀW_j + SᵀS` of the solution
+//! With `λ_j = 1/σ_j²` the solution `θ(λ)` has the residuals `S_j = ‖τ_j − W_j θ‖²`. The noise levels have converged
+//! when `F_j = ln λ_j + ln(S_j / d_j) = 0` for the degrees of freedom `d_j`. The fixed-point iteration `ln λ ← ln λ −
+//! F` reduces the error by a factor of two to four per step. Newton's step uses the derivative, from the scores `g_j
+//! = W_jᵀ(τ_j − W_j θ)` and the information `A = Σ λ_j W_jᵀW_j + SᵀS` of the solution:
 //!
 //! ```text
 //!     ∂θ/∂λ_j = A⁻¹ g_j,    ∂S_i/∂λ_j = −2 g_iᵀ A⁻¹ g_j,    ∂F_i/∂ln λ_j = δ_ij − 2 λ_j g_iᵀA⁻¹g_j / S_i
@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector};
 /// Maximum step in the logarithm of any `λ_j`; the linearisation is not valid beyond it.
 const MAX_LOG_STEP: f64 = 1.5;
 
-/// Weights `1/σ_j` after Newton's step from the `weights` of `solution`, whose residuals have `joint_sigma`; `None` if
-/// the step is too long or undefined.
+/// Weights `1/σ_j` after Newton's step from the `weights` of `solution`, whose residuals have the RMS `joint_sigma`;
+/// `None` if the step is too long or undefined.
 pub(super) fn newton_weights(
     stacked: &StackedProblem<'_>,
     split: &Split,

@@ -6,7 +6,8 @@ use crate::factor::{
 };
 use nalgebra::DMatrix;
 
-/// `W = Z Π + V` with `ZᵀV = 0`, over the weighted rows of all joints, from the triangle of `[Z | W | τ]`.
+/// Decomposes `W = Z Π + V` with `ZᵀV = 0`, over the weighted rows of all joints, from the triangle of `[Z | W | τ]`
+/// (instruments, regressor, torque).
 ///
 /// ```text
 ///     [Z | W | τ] = Q [ R_Z  M    m ]     Π = R_Z⁻¹ M,   W̃ = Z Π,   W̃ᵀW̃ = MᵀM,   VᵀV = R_VᵀR_V
@@ -17,11 +18,11 @@ use nalgebra::DMatrix;
 /// No product ZᵀW is formed, so the condition number of the instruments is not squared. Instruments that depend on
 /// earlier ones are excluded.
 pub(crate) struct Projection {
-    /// `[M | m]` as a factor: that of the rows `[W̃ | P_Z τ]`.
+    /// `[M | m]` as a factor: the factor of the rows `[W̃ | P_Z τ]`.
     pub(crate) explained: TriangularFactor,
     /// `[R_V | v]`: unexplained part of regressor and torque.
     pub(crate) left: TriangularFactor,
-    /// Π, (columns, columns); zero rows for excluded instruments.
+    /// Π, shape (columns, columns); zero rows for excluded instruments.
     pub(crate) coefficients: DMatrix<f64>,
     pub(crate) instruments: usize,
 }
@@ -74,7 +75,8 @@ impl Projection {
         Ok(Self { explained, left, coefficients, instruments: k })
     }
 
-    /// Coefficients of an equation's `[Z | W | τ]`, with columns `local`, in `[Z Π | W − Z Π]` over all columns.
+    /// Coefficients that map an equation's `[Z | W | τ]`, with columns `local`, to `[Z Π | W − Z Π]` over all
+    /// columns.
     pub(crate) fn parts(&self, local: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
         let count = self.coefficients.ncols();
         let mut fitted = DMatrix::zeros(2 * local.len() + 1, count);

@@ -88,7 +88,7 @@ pub struct RobustSettings {
     pub rank: RankSettings,
     /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// The iteration ends at this change relative to the error bars. Default 1e-4.
+    /// The iteration ends when no value changes by more than this share of its error bar. Default 1e-4.
     pub tolerance: f64,
     /// Maximum number of passes over the rows. Default 50.
     pub max_passes: usize,
@@ -127,18 +127,18 @@ impl RobustSettings {
 /// Some rows of one joint in one log, in the order in which they were absorbed into the problem.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBlock<'a> {
-    /// Number of the log in [`LinearProblem::logs`].
+    /// Index of the log in [`LinearProblem::logs`].
     pub log: usize,
-    /// Number of the joint in [`LinearProblem::joints`].
+    /// Index of the joint in [`LinearProblem::joints`].
     pub joint: usize,
-    /// Rows in this block.
+    /// Number of rows in this block.
     pub rows: usize,
     /// Column by column, torque last, as in [`TriangularFactor::absorb`](crate::TriangularFactor::absorb).
     pub panel: &'a [f64],
 }
 
 impl RowBlock<'_> {
-    /// Index of the block's equation; checks the size of the panel.
+    /// Index of the block's equation in the problem; also checks the size of the panel.
     pub(super) fn equation(&self, equations: &[JointRows]) -> Result<usize, EstimationError> {
         let Some(at) = equations.iter().position(|e| e.log == self.log && e.joint == self.joint) else {
             let what = "log and joint of a block, part of the problem".to_owned();
@@ -165,7 +165,7 @@ pub type RowVisitor<'a> = dyn FnMut(&RowBlock<'_>) -> Result<(), EstimationError
 /// Result of [`robust_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobustEstimate {
-    /// Values with covariance; `joint_sigma` is the MAD scale.
+    /// Values with covariance; `joint_sigma` is the scale s_j from the median absolute residual.
     pub estimate: Estimate,
     /// Share of rows with a weight below one half, for every joint.
     pub outlier_share: Vec<f64>,
@@ -192,25 +192,26 @@ struct Tally {
 /// Median magnitude of normal noise relative to its standard deviation: Φ⁻¹(3/4).
 const NORMAL_MEDIAN_ABS_DEVIATION: f64 = 0.674_489_750_196_081_7;
 
-/// The scales are updated in the first 1/SCALE_UPDATE_PART of the passes only. With few rows per parameter the scale
-/// and the weights otherwise oscillate; at a fixed scale reweighting converges, as in MM-estimates (Yohai, Ann. Stat.
-/// 15 (1987) 642).
+/// The noise scales are updated in the first 1/SCALE_UPDATE_PART of the passes only. With few rows per parameter,
+/// scales and weights would otherwise oscillate; with a fixed scale the reweighting converges, as in MM-estimates
+/// (Yohai, Ann. Stat. 15 (1987) 642).
 const SCALE_UPDATE_PART: usize = 4;
 
 /// Lower limit of the scale relative to the RMS torque, for data that most rows fit exactly (simulation).
 const MIN_SCALE_SHARE: f64 = 1.0e-9;
 
-/// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745`
-/// over joint j's rows.
+/// Solves `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0` for θ, with the scaled residuals `u_i = (τ_i − W_i θ)/s_j` and the
+/// scale `s_j = median |τ_i − W_i θ| / 0.6745` over the rows of joint j.
 ///
 /// Starts from [`weighted_values`] of `problem`'s factors. Every pass over the rows gives residuals, scales and the
-/// factors of the reweighted rows for the next θ. The scale of a pass is that of the previous θ, which has the same
-/// limit and saves a second pass; after a quarter of the passes the scales are fixed. Residuals are stored, one number
-/// per row, for their median; regressors are not. `pass` must give all rows of `problem` to its visitor at each call.
+/// factors of the reweighted rows for the next θ. A pass uses the scale of the previous θ, which converges to the
+/// same limit and saves a second pass. After a quarter of the passes the scales are fixed. Residuals are stored, one
+/// number per row, for their median; regressors are not. `pass` must give all rows of `problem` to its visitor at
+/// each call.
 ///
 /// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, because the weight of an outlier changes with the
-/// fit (Huber, Robust Statistics (1981), 7.6). Rows are weighted one by one; a filter spreads an outlier over its
-/// length, so use as little filtering as possible.
+/// fit (Huber, Robust Statistics (1981), 7.6). Rows are weighted one by one, but a filter spreads an outlier over
+/// several rows. Filter as little as possible.
 ///
 /// # Errors
 /// As [`weighted_values`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the problem; and
@@ -269,7 +270,7 @@ pub fn robust_least_squares<E: From<EstimationError>>(
         joint_degrees_of_freedom(&stacked, choice.free.len())?;
         let solution = solve(&triangle, choice, &settings.rank, problem.fallback());
         let scale_change = new_scales.iter().zip(&scales).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
-        // Rows have unit noise, so the norm is the change in units of error bars over all directions.
+        // The rows have unit noise, so this norm is the step length in error bars over all directions.
         let step: Vec<f64> = solution.values.iter().zip(&theta).map(|(new, old)| new - old).collect();
         let change = (triangle.regressor_triangle() * nalgebra::DVector::from_vec(step)).norm()
             / (choice.free.len().max(1) as f64).sqrt();
@@ -300,7 +301,7 @@ pub fn robust_least_squares<E: From<EstimationError>>(
     }
 }
 
-/// One pass: residuals of θ, and the factors of the rows times √w.
+/// One pass over the rows: residuals of θ, and factors of the rows multiplied by √w.
 fn gather<E: From<EstimationError>>(
     problem: &LinearProblem,
     theta: &[f64],

@@ -65,9 +65,9 @@ pub struct WeightedValues {
     pub converged: bool,
 }
 
-/// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the
-/// σ_j converge; N_j rows of the joint, p estimated columns, n joints. A [prior](LinearProblem::with_prior) adds `‖S(θ
-/// − m)‖²`.
+/// Solves `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1
+/// until the noise levels σ_j converge. N_j is the number of rows of joint j, p that of estimated columns, n that of
+/// joints. A [prior](LinearProblem::with_prior) adds `‖S(θ − m)‖²`.
 ///
 /// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. The excited columns are selected once, on the first
 /// solution. After the second solution Newton's step updates the σ_j as long as it improves convergence. Gautier,
@@ -121,7 +121,7 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
     let (joint_sigma, converged) = loop {
         let (squares, torque) = stacked.joint_squares(&solution.values)?;
         let joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
-        // The first weights are no noise estimate.
+        // The first weights are not a noise estimate.
         let change = if iterations > 1 { noise_change(&joint_sigma, &weights) } else { f64::INFINITY };
         let has_settled = change <= settings.tolerance;
         if has_settled || iterations == settings.max_iterations {
@@ -137,7 +137,7 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
         solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
         iterations += 1;
     };
-    // The rows are scaled by the last weights; on convergence their remaining noise is one up to the tolerance.
+    // The rows are scaled by the last weights. After convergence their noise is one, up to the tolerance.
     let (solution, weighted_variance) = (solution.with_inverse(), 1.0);
     Ok(PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations, converged })
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Coefficients `a` of `e_t = a_1 e_{t−1} + … + a_k e_{t−k} + white noise`, k at most `most`; empty for white noise.
+/// Coefficients `a` of the model `e_t = a_1 e_{t−1} + … + a_k e_{t−k} + white noise` with order k of at most `most`;
+/// empty for white noise.
 ///
 /// Levinson-Durbin recursion on the sample autocovariances `Σ e_t e_{t−l} / N`, which always gives a stable model; k
 /// minimises Schwarz's criterion (BIC) `N ln v_k + k ln N` with the innovation variance v_k of order k. Brockwell and
@@ -14,8 +15,8 @@ pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     from_covariances(&covariances, count).0
 }
 
-/// As [`autoregression`] from the autocovariances of `count` samples, from lag 0; also returns the innovation
-/// variance.
+/// Like [`autoregression`], but from the autocovariances of `count` samples, starting with lag 0; also returns the
+/// innovation variance.
 pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, f64) {
     let mut left = covariances.first().copied().unwrap_or_default();
     if left <= 0.0 || !left.is_finite() {
@@ -45,8 +46,8 @@ pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, 
     (best.1, best.2)
 }
 
-/// Shortens the memory of an autoregression, `a_k cᵏ`, so that no mode decays slower than the factor `most` per
-/// sample; also returns the innovation variance for these autocovariances.
+/// Shortens the memory of an autoregression by `a_k cᵏ`, so that every mode decays at least by the factor `most` per
+/// sample. Also returns the innovation variance for these autocovariances.
 pub(crate) fn shortened(a: Vec<f64>, variance: f64, covariances: &[f64], most: f64) -> (Vec<f64>, f64) {
     let order = a.len();
     let companion =
@@ -82,7 +83,7 @@ pub(crate) fn whitened(y: &[f64], a: &[f64]) -> DVector<f64> {
     )
 }
 
-/// [`whitened`] for every column.
+/// Applies [`whitened`] to every column.
 pub(crate) fn whitened_columns(columns: &DMatrix<f64>, a: &[f64]) -> DMatrix<f64> {
     if a.is_empty() {
         return columns.clone();

@@ -1,9 +1,9 @@
 //! **Nonlinear estimators**: the rows depend on the unknowns.
 //!
 //! [`simulated_least_squares`] fits the simulated to the measured motion (or torque). [`simultaneous_least_squares`]
-//! estimates motion and parameters together from encoder and torque channels with coloured noise;
-//! [`simultaneous_bound`] is its Cramér-Rao bound. [`spline_motion_least_squares`] does the same for any log, with a
-//! smoothing spline as motion.
+//! estimates motion and parameters together from positions and torques with noise that is correlated in time;
+//! [`simultaneous_bound`] is its Cramér-Rao bound. [`spline_motion_least_squares`] also estimates motion and
+//! parameters together, for any log: the motion is a smoothing spline.
 
 mod autoregression;
 mod simulated;

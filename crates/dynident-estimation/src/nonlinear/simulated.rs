@@ -1,4 +1,5 @@
-//! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE.
+//! Estimators that compare a simulation with the record: direct and inverse dynamic identification (DIDIM),
+//! closed-loop input error (CLIE) and closed-loop output error (CLOE).
 
 use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct SimulatedRows {
     /// Output to compare with the record: torque for DIDIM and CLIE, position for CLOE.
     pub output: DVector<f64>,
-    /// W of the simulated motion, shape (rows, columns); only for DIDIM, else empty (no rows).
+    /// W, the regressor of the simulated motion, shape (rows, columns); only for DIDIM, otherwise empty (no rows).
     pub regressor: DMatrix<f64>,
 }
 
@@ -38,8 +39,9 @@ pub enum SimulatedCriterion {
     /// identification (DIDIM). Needs no measured position and only a few simulations.
     #[default]
     Didim,
-    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y is the torque) or
-    /// output error (y is the position). Needs one simulation per parameter and step.
+    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by finite differences. This is closed-loop input error
+    /// (CLIE) if y is the torque, closed-loop output error (CLOE) if y is the position. Needs one simulation per
+    /// parameter and step.
     Output,
 }
 
@@ -91,9 +93,9 @@ pub struct SimulatedProblem {
     pub names: Vec<String>,
     /// Start values: nominal values or a least-squares estimate.
     pub start: Vec<f64>,
-    /// Typical size of each parameter, greater than zero: the unit of its differences.
+    /// Typical size of each parameter, greater than zero: the unit of its finite differences.
     pub scale: Vec<f64>,
-    /// Measured outputs, in the rows of the simulation.
+    /// Measured outputs, in the row order of the simulation.
     pub measured: DVector<f64>,
     /// Standard deviation of each row's noise.
     pub noise_std: DVector<f64>,
@@ -106,28 +108,29 @@ pub struct SimulatedEstimate {
     pub names: Vec<String>,
     /// One value per parameter; the start value for an unexcited parameter.
     pub values: Vec<f64>,
-    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square residual; valid for white noise.
+    /// `s² (JᵀJ)⁻¹` with the Jacobian J of rows divided by their noise, and the mean square residual s²; valid for
+    /// white noise.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
     /// Square roots of its diagonal.
     pub std: Vec<f64>,
-    /// Sum of squares of the rows' residuals over their noise.
+    /// Sum of squares of the residuals divided by the noise of their rows.
     pub cost: f64,
     /// Number of steps.
     pub iterations: usize,
     /// Number of simulations.
     pub simulations: usize,
-    /// Status of the estimator. [`EstimateStatus::IterationLimit`] also if a step is not small but no shorter step
-    /// lowers the cost.
+    /// Status of the estimator. It is [`EstimateStatus::IterationLimit`] also if no shorter step lowers the cost
+    /// although the step is not small.
     pub status: EstimateStatus,
     /// Rank decisions at the last point.
     pub rank: RankReport,
-    /// Derivatives of the outputs by the parameters at the last point, shape (rows, parameters): W of the simulated
-    /// motion for DIDIM, J for CLIE and CLOE.
+    /// Derivatives of the outputs with respect to the parameters at the last point, shape (rows, parameters): for
+    /// DIDIM the regressor W of the simulated motion, for CLIE and CLOE the Jacobian J.
     #[serde(skip)]
     pub jacobian: DMatrix<f64>,
-    /// Measured output minus `W θ` (DIDIM) or minus the simulated output, so that `jacobian · (θ' - values) ≈
-    /// residual` is the problem of the next step. Use it for error bars with coloured residuals.
+    /// Measured output minus `W θ` (DIDIM) or minus the simulated output. `jacobian · (θ' - values) ≈ residual` is
+    /// the problem of the next step. Use it for error bars with residuals that are correlated in time.
     #[serde(skip)]
     pub residual: DVector<f64>,
 }
@@ -172,8 +175,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         let noise = (now.cost / (rows - choice.free.len()) as f64).sqrt().max(f64::MIN_POSITIVE);
         let length = (triangle.regressor_triangle() * &step).norm() / (choice.free.len().max(1) as f64).sqrt();
         converged = length <= settings.tolerance * noise;
-        // Within the tolerance costs differ by the accuracy of the simulation; the fixed point of DIDIM is not exactly
-        // at the minimum cost.
+        // Close to the minimum, costs differ by the accuracy of the simulation. The fixed point of DIDIM is not
+        // exactly at the minimum cost.
         let most = match settings.criterion {
             SimulatedCriterion::Didim => now.cost * MAX_DIDIM_COST_RATIO,
             SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
@@ -227,8 +230,8 @@ impl SimulatedProblem {
     }
 }
 
-/// Maximum increase of the cost by a step of DIDIM, as a factor: with torque noise its fixed point differs from the
-/// minimum by part of an error bar.
+/// Maximum factor by which a step of DIDIM may increase the cost. With torque noise its fixed point differs from the
+/// minimum by a part of an error bar.
 const MAX_DIDIM_COST_RATIO: f64 = 1.05;
 
 struct Run<'a, S> {
@@ -263,7 +266,8 @@ impl<S: SimulatedMotion> Run<'_, S> {
             }
             SimulatedCriterion::Output => self.jacobian(theta, now, settings.difference)?,
         };
-        // DIDIM compares with W θ, the simulated torque except for static friction and filters.
+        // DIDIM compares the measured torque with W θ, which equals the simulated torque except for static friction
+        // and filters.
         let residual = match settings.criterion {
             SimulatedCriterion::Didim => &problem.measured - &jacobian * theta,
             SimulatedCriterion::Output => &problem.measured - &now.rows.output,

@@ -1,4 +1,4 @@
-//! Motion and parameters from one likelihood, with noise in positions and torque.
+//! Maximum-likelihood estimate of motion and parameters together, with noise in positions and torques.
 
 use super::autoregression::autoregression;
 use super::simultaneous_rows::{ChannelRows, WhiteRows, cost};
@@ -8,12 +8,12 @@ use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degree
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Model of [`simultaneous_least_squares`]: measurements minus the predictions from motion and parameters.
+/// Model of [`simultaneous_least_squares`]: measurements minus predictions from motion and parameters.
 pub trait SimultaneousModel {
     /// Error of the model.
     type Error: From<EstimationError>;
 
-    /// `y − f` by channel, always with the same number of rows.
+    /// Residuals `y − f` (measurement minus prediction) by channel, always with the same number of rows.
     ///
     /// # Errors
     /// Defined by the model.
@@ -36,7 +36,7 @@ pub struct ChannelNoise {
     pub autoregression: Vec<f64>,
 }
 
-/// Names and start values.
+/// Names and start values of the unknowns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimultaneousProblem {
     /// Names of the parameters.
@@ -55,11 +55,11 @@ pub struct SimultaneousProblem {
 pub struct SimultaneousSettings {
     /// Criteria for an excited column after the motion is eliminated.
     pub rank: RankSettings,
-    /// Method of the reported covariance of whitened rows; from time segments by default. The white one is correct for
-    /// autoregressive noise and a complete model.
+    /// Method of the reported covariance of whitened rows; from time segments by default. The white-noise covariance
+    /// is correct if the noise is autoregressive and the model complete.
     pub covariance: CovarianceMethod,
-    /// Maximum order of the autoregression of a channel's residuals, selected by Schwarz's criterion. Default 4; 0
-    /// assumes white noise.
+    /// Maximum order of the autoregression of a channel's residuals; Schwarz's criterion (BIC) selects the order.
+    /// Default 4; 0 assumes white noise.
     pub most_autoregression: usize,
     /// The iteration ends at this step length, in error bars over all directions. Default 1e-3.
     pub tolerance: f64,
@@ -97,7 +97,7 @@ impl SimultaneousSettings {
 /// Result of [`simultaneous_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimultaneousEstimate {
-    /// The parameters. The joints of the estimate are channels here, with σ of whitened rows.
+    /// The parameters. The "joints" of this estimate are the channels, with σ of whitened rows.
     pub estimate: Estimate,
     /// Estimated unknowns of the motion.
     pub motion: Vec<f64>,
@@ -107,25 +107,26 @@ pub struct SimultaneousEstimate {
 
 /// The rows are linearised again if a step is longer than this share of the previous one.
 const MAX_STEP_RATIO: f64 = 0.25;
-/// The rows are linearised again at the end if the estimate moved by more than this, in error bars.
+/// The rows are linearised again at the end if the estimate moved farther than this since the last linearisation, in
+/// error bars.
 const MAX_MOVE_ERROR_BARS: f64 = 1.0;
 
-/// `argmin Σ_c Σ_t [A_c (y_c − f_c(motion, parameters))]_t² / σ_c²` over motion **and** parameters: maximum likelihood
-/// for normal errors in all channels, with the whitening filter `A_c` of the channel's autoregressive noise and its
-/// standard deviation σ_c, both estimated from the residuals.
+/// Solves `argmin Σ_c Σ_t [A_c (y_c − f_c(motion, parameters))]_t² / σ_c²` over motion **and** parameters, for
+/// channels c and instants t. This is maximum likelihood for normal errors in all channels. `A_c` is the whitening
+/// filter of the channel's autoregressive noise and σ_c its standard deviation, both estimated from the residuals.
 ///
 /// Least squares on a measured motion treats the motion as exact. Position noise then enters the torque residual of
-/// heavy links: it is coloured, correlated across joints, and can be as large as the torque noise. Here the motion
-/// (for example Fourier coefficients) is also unknown, and positions and torques are weighted by their precision.
-/// There must be far fewer unknowns than rows for consistent σ_c.
+/// heavy links. This noise is correlated in time and across joints, and can be as large as the torque noise. Here the
+/// motion (for example Fourier coefficients) is also unknown, and positions and torques are weighted by their
+/// precision. The estimates σ_c are consistent only if there are far fewer unknowns than rows.
 ///
-/// Gauss-Newton steps; a step that increases the sum is halved. The rows are linearised again after the first step and
-/// then only if steps do not shrink to a quarter or move further than an error bar. The noise colour comes from the
-/// residuals of the last linearisation; σ_c is updated in every step, `σ_c² = RSS_c / (N_c − leverage of the
-/// channel)`. At the end the motion is eliminated from the rows, `X̃ = X_parameters − X_motion (X_motionᵀ X_motion)⁻¹
-/// X_motionᵀ X_parameters`. The covariance of the parameters is that of a linear problem with those rows: `(Σ
-/// X̃ᵀX̃/σ²)⁻¹` for white noise, which is the Cramér-Rao bound with unknown motion, or a sandwich. All rows are held
-/// in memory.
+/// Gauss-Newton steps; a step that increases the sum is halved. The rows are linearised again after the first step.
+/// Later this happens only if steps do not shrink to a quarter or move further than an error bar. The autoregression
+/// is estimated from the residuals of the last linearisation; σ_c is updated in every step, `σ_c² = RSS_c / (N_c −
+/// leverage of the channel)`. At the end the motion is eliminated from the rows, `X̃ = X_parameters − X_motion
+/// (X_motionᵀ X_motion)⁻¹ X_motionᵀ X_parameters`. The covariance of the parameters is that of a linear problem with
+/// those rows. For white noise it is `(Σ X̃ᵀX̃/σ²)⁻¹`, the Cramér-Rao bound with unknown motion; otherwise a
+/// sandwich. All rows are held in memory.
 ///
 /// Fuller, Measurement Error Models (1987), 3.1 to 3.3; Seber and Wild, Nonlinear Regression (1989), 6.2
 /// (autoregressive errors), 14.3 (elimination).
@@ -164,7 +165,7 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
         let before = cost(&residuals, &sigma);
         let better = descended(model, &rows, &sigma, &unknowns, &step, before)?;
         let worse = better.is_none();
-        // Steps at rounding level may increase a sum of rounding errors.
+        // Steps as small as rounding may increase a sum of rounding errors.
         let settled = length <= settings.tolerance;
         if worse && !settled && unknowns == centre {
             break;
@@ -203,8 +204,8 @@ struct Evaluated {
     residuals: Vec<DVector<f64>>,
 }
 
-/// The unknowns after the longest of the full, half, quarter, ... step with a cost of at most `before`; `None` if
-/// no step has one.
+/// Shortens the step (full, half, quarter, ...) until the cost is at most `before`, and returns the unknowns after
+/// it; `None` if no step has such a cost.
 fn descended<M: SimultaneousModel>(
     model: &mut M,
     rows: &WhiteRows,
@@ -227,7 +228,7 @@ fn descended<M: SimultaneousModel>(
     Ok(None)
 }
 
-/// Estimates the parameters from rows without the motion, with noise `sigma` of the channels.
+/// Estimates the parameters from rows without the motion; `sigma` is the noise of the channels.
 fn estimate_of(
     problem: &LinearProblem,
     settings: &SimultaneousSettings,
@@ -255,8 +256,8 @@ fn estimate_of(
 }
 
 /// Cramér-Rao bound of the parameters' covariance with unknown motion: the parameters' block of `(Σ_c X_cᵀ A_cᵀ A_c
-/// X_c / σ_c²)⁻¹`, for rows linearised at the truth and the true noise. `motion` is the number of the motion's
-/// unknowns, `names` are the parameters'; residuals are not used.
+/// X_c / σ_c²)⁻¹`, for rows linearised at the true unknowns and with the true noise. `motion` is the number of
+/// unknowns of the motion, `names` are the names of the parameters. Residuals are not used.
 ///
 /// # Errors
 /// [`EstimationError::Mismatch`] for wrong shapes, [`EstimationError::Setting`] for a standard deviation that is not

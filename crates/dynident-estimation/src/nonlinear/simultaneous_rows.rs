@@ -6,23 +6,24 @@ use crate::error::{EstimationError, expect};
 use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Pivot of the information, scaled to a unit diagonal, that is treated as zero: far below the value of an excited
-/// column and above rounding.
+/// A pivot of the information matrix (scaled to a unit diagonal) below this value is treated as zero. The value is
+/// far below that of an excited column and above rounding.
 const MIN_PIVOT: f64 = 1.0e-13;
 /// Lower limit of a channel's σ relative to the size of its prediction, for noise-free data.
 const MIN_SIGMA_SHARE: f64 = 1.0e-9;
-/// Columns multiplied at a time: only half of the symmetric normal matrix is computed.
+/// Number of columns multiplied at a time; only half of the symmetric normal matrix is computed.
 const STRIP_COLUMNS: usize = 64;
 
 /// One channel's rows at given unknowns: positions or torques of a joint in one uninterrupted piece of one log, in
 /// order of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelRows {
-    /// `y − f(motion, parameters)`, one number for each row.
+    /// `y − f(motion, parameters)` (measurement minus prediction), one number for each row.
     pub residual: Vec<f64>,
-    /// Number of the motion's unknown of the first column of `by_motion`; the others follow.
+    /// Index of the motion unknown of the first column of `by_motion`; the other columns are the unknowns that
+    /// follow.
     pub first_motion: usize,
-    /// `∂f/∂motion`, shape (rows, any): other unknowns do not act on this channel.
+    /// `∂f/∂motion`, shape (rows, any); unknowns without a column do not act on this channel.
     pub by_motion: DMatrix<f64>,
     /// `∂f/∂parameters`, shape (rows, parameters), or (rows, 0) if they do not act on this channel.
     pub by_parameters: DMatrix<f64>,
@@ -37,11 +38,11 @@ pub(crate) struct WhiteRows {
 }
 
 struct WhiteChannel {
-    /// Number of every column among all unknowns.
+    /// Index of every column among all unknowns.
     places: Vec<usize>,
     /// Number of columns that belong to the motion.
     motion: usize,
-    /// Derivatives by those unknowns.
+    /// Derivatives with respect to these unknowns.
     columns: DMatrix<f64>,
     /// `columnsᵀ columns`.
     normal: DMatrix<f64>,
@@ -146,7 +147,7 @@ impl WhiteRows {
         (least > MIN_PIVOT).then_some(System { scale, factor })
     }
 
-    /// The first unknown that the rows do not separate from the previous ones.
+    /// The first unknown whose effect the rows do not separate from that of the previous unknowns.
     pub(crate) fn undetermined(&self, sigma: &[f64], names: &[String]) -> EstimationError {
         let information = self.information(sigma);
         let size = information.nrows();
@@ -189,7 +190,7 @@ impl WhiteRows {
         self.channels.iter().zip(sigma).map(of).collect()
     }
 
-    /// `√(‖r_c‖²/(N_c − leverage_c))`.
+    /// σ_c of every channel: `√(‖r_c‖²/(N_c − leverage_c))`.
     pub(crate) fn sigma(
         &self,
         residuals: &[DVector<f64>],

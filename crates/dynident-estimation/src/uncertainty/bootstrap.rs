@@ -1,9 +1,10 @@
 //! Block bootstrap: variance of the estimate when the time segments are drawn again with replacement.
 //!
-//! Each replicate draws as many segments of a joint in a log as there are and solves again with the weights of the
-//! fit. In whitened coordinates (the information of the fit is the unit matrix) the change of a replicate is `(Σ_g n_g
-//! H_g)⁻¹ Σ_g n_g s_g`: H_g is the information of segment g, s_g its score, n_g how often it was drawn. Künsch, Annals
-//! of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
+//! Each replicate draws segments of each joint in each log with replacement, as many as there are, and solves again
+//! with the weights of the fit. In whitened coordinates (the information of the fit is the unit matrix) the change of
+//! a replicate is `(Σ_g n_g H_g)⁻¹ Σ_g n_g s_g`. H_g is the information of segment g, s_g its score, and n_g how
+//! often it was drawn. Künsch, Annals of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their
+//! Application (1997), 8.2.
 
 use crate::error::EstimationError;
 use dynident_model::sample::Random;
@@ -14,7 +15,7 @@ const REPLICATES: usize = 300;
 /// Fixed, so that the same data give the same error bars.
 const SEED: u64 = 1;
 
-/// The segments of one joint in one log, whitened: information and score of each.
+/// The segments of one joint in one log in whitened coordinates: information and score of each segment.
 pub(super) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
 
 /// Second moment of the replicates' changes about zero, their expected value. `fixed` is information that is not

@@ -1,8 +1,9 @@
 //! Covariance of an estimate under white noise and under noise that is correlated in time.
 //!
-//! Residuals of robot torque are strongly coloured (lag-1 correlations of 0.3 to 0.98 at usual rates), because
-//! unmodelled friction and elasticity last longer than a sample. The textbook `σ²(WᵀW)⁻¹` treats every sample as
-//! independent; its standard deviation is too small by a factor of about √((1+ρ)/(1−ρ)). The cluster-robust covariance
+//! Residuals of robot torque are strongly correlated in time (lag-1 correlations ρ of 0.3 to 0.98 at usual rates),
+//! because unmodelled friction and elasticity last longer than a sample. The textbook covariance `σ²(WᵀW)⁻¹` treats
+//! every sample as independent; its standard deviation is too small by a factor of about √((1+ρ)/(1−ρ)). The
+//! cluster-robust covariance over time segments g includes these correlations:
 //!
 //! ```text
 //!     V = c A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹,   A = Σ w_j² W_jᵀW_j,   s_g = w_j² W_gᵀ(τ_g − W_g θ),   c = G/(G−1) · (N−1)/(N−p)
@@ -39,8 +40,8 @@ pub enum CovarianceMethod {
     /// A time segment of a log is one cluster for all joints, so errors may also be correlated across joints. Needs
     /// more segments, because there are fewer clusters.
     SegmentsAcrossJoints,
-    /// Neighbouring segments may also be correlated: Bartlett weights up to a lag chosen from the scores (Newey and
-    /// West 1994). For segments that are shorter than the correlation; needs many segments.
+    /// Neighbouring segments may also be correlated: Bartlett weights up to a lag that is selected from the scores
+    /// (Newey and West 1994). For segments that are shorter than the correlation time; needs many segments.
     NeweyWest,
     /// Segments drawn with replacement, 300 times, from a fixed seed. Like [`Segments`](Self::Segments), but includes
     /// the variation of the information matrix.
@@ -50,14 +51,14 @@ pub enum CovarianceMethod {
 }
 
 pub(crate) struct Covariances {
-    /// By the chosen method, over all columns (zero for fixed columns).
+    /// Covariance by the chosen method, over all columns (zero for fixed columns).
     pub(crate) chosen: DMatrix<f64>,
     pub(crate) white: DMatrix<f64>,
-    /// Clusters G (0 for the white method).
+    /// Number of clusters G (0 for the white method).
     pub(crate) clusters: usize,
     /// Degrees of freedom of the variance of every column (infinite for fixed columns).
     pub(crate) degrees_of_freedom: Vec<f64>,
-    /// For every joint the mean score variance relative to white noise.
+    /// For every joint, the mean variance of the scores relative to white noise.
     pub(crate) inflation: Vec<f64>,
     /// For every joint the correlation of the scores of neighbouring segments.
     pub(crate) neighbours: Vec<f64>,
@@ -130,7 +131,7 @@ fn segments(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationError>
     Ok(second_moment(&all, scores.free, factor))
 }
 
-/// As [`segments`] with the scores summed over the joints of a log.
+/// Like [`segments`], with the scores summed over the joints of a log.
 fn segments_across_joints(
     scores: &Scores<'_>,
     problem: &LinearProblem,

@@ -1,7 +1,8 @@
 //! Student's t, Fisher's F and chi-squared distributions.
 //!
-//! The incomplete beta and gamma functions are those of `statrs`. Its inverse for Student's t loses digits above a
-//! thousand degrees of freedom (decision 0005), so an expansion about the normal distribution is used there.
+//! The incomplete beta and gamma functions come from `statrs`. The inverse of its Student's t distribution loses
+//! digits above a thousand degrees of freedom (decision 0005), so an expansion about the normal distribution is used
+//! there.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};

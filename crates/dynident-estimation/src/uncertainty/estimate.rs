@@ -124,14 +124,15 @@ pub struct Estimate {
     pub covariance_white: DMatrix<f64>,
     /// Method of `covariance`.
     pub covariance_method: CovarianceMethod,
-    /// Clusters of `covariance` (0 for white noise).
+    /// Number of clusters of `covariance` (0 for white noise).
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
-    /// `std` from the residuals alone, without the error that [`with_further_error`](Self::with_further_error) adds.
+    /// `std` from the residuals alone, without the additional error of
+    /// [`with_further_error`](Self::with_further_error).
     pub noise_std: Vec<f64>,
-    /// Degrees of freedom of the variance of each value (Satterthwaite; N − p for white errors). With few, the
-    /// interval is wider than 1.96 std.
+    /// Degrees of freedom of the variance of each value (Satterthwaite; N − p for white errors). With few degrees of
+    /// freedom the half-width of the interval is larger than 1.96 std.
     pub std_degrees_of_freedom: Vec<f64>,
     /// Half-width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
@@ -143,19 +144,19 @@ pub struct Estimate {
     pub iterations: usize,
     /// Standard deviation of each joint's residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic joint).
     pub joint_sigma: Vec<f64>,
-    /// For every joint the squared segment scores relative to white noise: about (1+ρ)/(1−ρ) for residuals with lag-1
-    /// correlation ρ, slowly changing columns and long segments.
+    /// For every joint, the squared scores of the time segments relative to their expectation for white noise. The
+    /// ratio is about (1+ρ)/(1−ρ) for residuals with lag-1 correlation ρ, slowly changing columns and long segments.
     pub score_inflation: Vec<f64>,
     /// Effective lag-1 correlation of every joint, between −1 and 1: the ρ for which `score_inflation` is
-    /// (1+ρ)/(1−ρ). It determines the error bars and is below the residual's own correlation where columns alternate
-    /// fast.
+    /// (1+ρ)/(1−ρ). This correlation determines the error bars. It is lower than the correlation of the residuals
+    /// themselves if columns alternate fast.
     pub effective_lag1: Vec<f64>,
-    /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g.
-    /// Above about 0.2 the segments are too short and the error bars still too small: use fewer, longer segments.
+    /// For every joint, the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g.
+    /// If it exceeds about 0.2, the segments are too short and the error bars too small: use fewer, longer segments.
     pub segment_correlation: Vec<f64>,
     /// Rank decisions.
     pub rank: RankReport,
-    /// N − p: all rows minus the estimated columns.
+    /// N − p: number of all rows minus number of estimated columns.
     pub degrees_of_freedom: usize,
     /// Condition number of the (weighted) rows of the estimated columns, unscaled; depends on units.
     pub condition_number_raw: f64,
@@ -238,8 +239,8 @@ impl PointEstimate {
     }
 }
 
-/// Checks that all rows together and those of each joint leave degrees of freedom for the noise; returns `N_j − p/n`
-/// for every joint.
+/// Checks that all rows together, and the rows of each joint, leave degrees of freedom for the noise; returns `N_j −
+/// p/n` for every joint.
 pub(crate) fn joint_degrees_of_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;
     let rows = problem.joint_rows();

@@ -1,8 +1,8 @@
 //! **Uncertainty**: the [`Estimate`] that every linear estimator returns, and its error bars.
 //!
 //! Residuals of robot torque are correlated in time, so the textbook covariance is too small. A [`CovarianceMethod`]
-//! selects another one; the default is the delete-one jackknife over time segments. [`student_half_width`] with
-//! Satterthwaite's degrees of freedom gives the 95 % half-width from a standard deviation.
+//! selects another covariance; the default is the delete-one jackknife over time segments. [`student_half_width`]
+//! with Satterthwaite's degrees of freedom converts a standard deviation to the half-width of the 95 % interval.
 
 mod bootstrap;
 mod covariance;

@@ -1,5 +1,5 @@
-//! Newey-West covariance: scores are correlated with their neighbours in time, with a weight that decreases with the
-//! lag.
+//! Newey-West covariance: the scores of time segments are correlated with their neighbours, with a weight that
+//! decreases with the lag.
 //!
 //! ```text
 //!     S = Σ_g s_g s_gᵀ + Σ_{l=1}^{L} (1 − l/(L+1)) Σ_g (s_g s_{g−l}ᵀ + s_{g−l} s_gᵀ)

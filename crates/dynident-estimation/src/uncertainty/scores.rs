@@ -1,7 +1,8 @@
 //! Scores of a fit in coordinates where its information is the unit matrix.
 //!
-//! With the information `A = RᵀR` of the free columns, `R⁻ᵀ` whitens: a covariance method uses `R⁻ᵀ s_g` of each time
-//! segment g of each joint in each log, and its result `M` maps to the columns as `R⁻¹ M R⁻ᵀ`.
+//! The information of the free columns is `A = RᵀR`, so `R⁻ᵀ` whitens scores. A covariance method computes a matrix M
+//! from `R⁻ᵀ s_g` of each time segment g of each joint in each log. `R⁻¹ M R⁻ᵀ` is then the covariance of the
+//! columns.
 
 use crate::error::EstimationError;
 use crate::factor::{JointRows, ReducedRows, Solution, Split, StackedProblem};
@@ -22,12 +23,12 @@ pub(crate) struct Fit<'a> {
 }
 
 pub(super) struct Scores<'a> {
-    /// One for each equation of the problem, in the same order.
+    /// Scores of each equation of the problem, in the same order.
     pub(super) joints: Vec<JointScores<'a>>,
     pub(super) free: usize,
     /// R⁻¹ of the free columns.
     inverse: &'a DMatrix<f64>,
-    /// Index of every column among the free ones.
+    /// Index of every column among the free columns.
     place: Vec<Option<usize>>,
 }
 
@@ -74,7 +75,7 @@ impl<'a> Scores<'a> {
         self.joints.iter().map(|joint| joint.scores.len()).sum()
     }
 
-    /// For every joint the squared scores relative to white noise, and the correlation of the scores of neighbouring
+    /// For every joint, the squared scores relative to white noise, and the correlation of the scores of neighbouring
     /// segments.
     pub(super) fn inflation_and_neighbours(&self, fit: &Fit<'_>) -> (Vec<f64>, Vec<f64>) {
         let count = fit.joint_sigma.len();
@@ -104,8 +105,8 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of freedom of every column's variance: `independent` times those of its clusters under white noise;
-    /// infinite for fixed columns.
+    /// Degrees of freedom of every column's variance: `independent` times the degrees of freedom of its clusters
+    /// under white noise; infinite for fixed columns.
     pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
         let shares: Vec<Vec<f64>> = self.joints.par_iter().flat_map_iter(|joint| joint.shares(self.inverse)).collect();
         let degrees_of_freedom =
@@ -128,7 +129,7 @@ impl JointScores<'_> {
     }
 
     /// Change of the estimate when one segment is left out, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g − W_g
-    /// θ)` with the segment's block of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
+    /// θ)` with the segment's block of the hat matrix, `H_g = w² W_g A⁻¹ W_gᵀ`.
     pub(super) fn changes_without(&self) -> Vec<DVector<f64>> {
         // If a segment alone determines a direction, its residual and 1 − leverage are both zero there; the ridge
         // avoids 0/0.

@@ -1,4 +1,4 @@
-//! Distance of two links, computed with another algorithm than the search.
+//! Distance of two links, computed with a different algorithm than in the search.
 //!
 //! The nearest points of two convex hulls are weighted means of their corners. Each iteration moves weight from the
 //! worst corner to the best one (Mitchell, Demyanov and Malozemov, SIAM J. Control 12(1), 1974) until no further gain
@@ -15,7 +15,7 @@ pub(super) struct Hull {
 pub(super) struct Link {
     pub(super) body: Option<usize>,
     pub(super) hulls: Vec<Hull>,
-    /// Bounding ball of each hull: centre and radius, m.
+    /// Bounding sphere of each hull: centre and radius, m.
     balls: Vec<(Vec3, f64)>,
     /// Distance of the farthest point from the body's origin, m.
     reach_m: f64,
@@ -39,7 +39,8 @@ impl Pair {
         Self { links, clearance_m, size_m, known: None }
     }
 
-    /// Ratio to the clearance: 1 at the clearance, larger below it. Returns `worst` if the ratio cannot exceed it.
+    /// Ratio to the clearance: 1 at the clearance, larger if the distance is smaller. Returns `worst` if the ratio
+    /// cannot exceed it.
     pub(super) fn ratio(&mut self, placements: &[Transform], worst: f64) -> f64 {
         let at = [0, 1].map(|k| self.links[k].body.map_or(Transform::IDENTITY, |body| placements[body]));
         let ratio = |apart: f64| 1.0 + (self.clearance_m - apart) / self.size_m;
@@ -120,8 +121,8 @@ impl Link {
     }
 }
 
-/// Lower bound of the distance of two hulls, at most `near` below the distance or larger than `enough`; zero if they
-/// overlap.
+/// Lower bound of the distance of two hulls. It is at most `near` below the distance, or larger than `enough`; zero
+/// if the hulls overlap.
 fn certified_m(first: &[Vec3], second: &[Vec3], enough: f64, near: f64) -> f64 {
     let mut shares = [vec![0.0; first.len()], vec![0.0; second.len()]];
     shares[0][0] = 1.0;
@@ -133,7 +134,8 @@ fn certified_m(first: &[Vec3], second: &[Vec3], enough: f64, near: f64) -> f64 {
         if length <= near {
             return 0.0;
         }
-        // Along `apart` the best corner of the first hull is the lowest, that of the second the highest.
+        // Along the direction `apart`, the best corner of the first hull is the lowest, and the best corner of the
+        // second hull the highest.
         let mut exchange: Option<(f64, usize, usize, usize, Vec3)> = None;
         let mut reach = 0.0;
         for (side, corners) in [first, second].into_iter().enumerate() {

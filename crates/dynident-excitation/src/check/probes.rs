@@ -1,4 +1,4 @@
-//! Checks of each sample: the limits of a study with names resolved in the robot description.
+//! Checks of each sample against the limits of a study, with names resolved in the robot description.
 
 use super::LimitReport;
 use super::apart::{Hull, Link, Pair};
@@ -133,7 +133,7 @@ impl Probes {
     }
 }
 
-/// Points and their names; for an empty list the origins of the moving bodies.
+/// Points and their names; for an empty list, the origins of the moving bodies.
 fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
     let mut found = Vec::new();
     let bodies = |body: usize| -> (Option<usize>, &Body) {
@@ -200,7 +200,7 @@ fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
     body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
 }
 
-/// Distance of `x` from the middle of its range, in half ranges.
+/// Distance of `x` from the middle of its range, divided by half the range.
 fn range_ratio(x: f64, lower: f64, upper: f64) -> f64 {
     let half = upper / 2.0 - lower / 2.0;
     ((x - lower) / half - 1.0).max((upper - x) / half - 1.0)

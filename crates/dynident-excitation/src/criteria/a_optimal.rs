@@ -1,4 +1,4 @@
-//! A-optimality: the sum of the parameters' variances, `tr D⁻¹`.
+//! A-optimality: the sum of the parameters' variances, `tr D⁻¹`, with the information matrix D.
 
 use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;

@@ -4,13 +4,14 @@ use super::{Criterion, ValueAndGradient};
 use crate::symmetric_eigen::SymmetricEigen;
 use nalgebra::DMatrix;
 
-/// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`. It is smooth where eigenvalues coincide, as
-/// the lowest three or four do at an optimum. A larger `p` approximates the condition number more closely.
+/// Condition number of the regressor W by p-norms of the eigenvalues λ of its information matrix: `½ (log ‖λ‖_p + log
+/// ‖1/λ‖_p)`. It is smooth where eigenvalues coincide, which the lowest three or four do at an optimum. A larger `p`
+/// approximates the condition number more closely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionNumber {
     /// Order of the norm, positive; 40 to 80 is suitable from the start of a search.
     pub order: f64,
-    /// Divides each column by its norm first, so that the condition number does not depend on units.
+    /// Whether each column is first divided by its norm, so that the condition number does not depend on units.
     pub scaled: bool,
 }
 
@@ -21,7 +22,7 @@ impl Default for ConditionNumber {
 }
 
 impl ConditionNumber {
-    /// `S D S` with `S = diag(D)^-1/2`, or `D` if not scaled, and the scale.
+    /// `S D S` with `S = diag(D)^-1/2`, or `D` if not scaled; also the scale S.
     fn scaling(&self, information: &DMatrix<f64>) -> Option<(DMatrix<f64>, Vec<f64>)> {
         if !self.scaled {
             return Some((information.clone(), vec![1.0; information.nrows()]));
@@ -54,7 +55,7 @@ impl Criterion for ConditionNumber {
             return None;
         }
         let p = self.order;
-        // Relative to the largest term, so that no power overflows.
+        // The terms are divided by the largest, so that no power overflows.
         let high: Vec<f64> = eigen.values.iter().map(|l| (l / largest).powf(p)).collect();
         let low: Vec<f64> = eigen.values.iter().map(|l| (smallest / l).powf(p)).collect();
         let (high_sum, low_sum) = (high.iter().sum::<f64>(), low.iter().sum::<f64>());

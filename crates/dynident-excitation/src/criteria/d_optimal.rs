@@ -1,5 +1,5 @@
-//! D-optimality: the volume of the confidence ellipsoid of the parameters, `-log det D`. Other units or base columns
-//! only add a constant.
+//! D-optimality: the volume of the confidence ellipsoid of the parameters, as `-log det D` of the information matrix
+//! D. Other units or other base columns only add a constant.
 
 use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;

@@ -1,4 +1,5 @@
-//! E-optimality: the variance along the worst direction, `1 / λ_min(D)`.
+//! E-optimality: the variance along the direction with the largest variance, `1 / λ_min(D)`, with the information
+//! matrix D.
 
 use super::{Criterion, ValueAndGradient};
 use crate::symmetric_eigen::SymmetricEigen;

@@ -16,8 +16,8 @@ pub use worst_directions::KieferPhiP;
 
 use nalgebra::DMatrix;
 
-/// Value of a criterion and its symmetric derivative with respect to `D`; `None` if `D` is not positive definite, that
-/// is if some parameter is not excited.
+/// Value of a criterion and its symmetric derivative with respect to `D`; `None` if `D` is not positive definite,
+/// which means that the motion does not excite some parameter.
 pub type ValueAndGradient = Option<(f64, DMatrix<f64>)>;
 
 /// A criterion on the information matrix.
@@ -28,14 +28,14 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
     /// Value and derivative of the smooth form that the optimisers minimise.
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient;
 
-    /// Approximate change of the value when a motion with this number of columns becomes 1.5 times as large. Searches
-    /// scale penalties and steps by it.
+    /// Approximate change of the value when a motion with this number of columns is enlarged by a factor of 1.5.
+    /// Searches scale penalties and steps by it.
     fn scale(&self, _columns: usize) -> f64 {
         1.0
     }
 
-    /// Scale of the gradients. It differs from the value, because the units of the parameters add a constant to a
-    /// logarithm.
+    /// Scale of the gradients. It can differ from the scale of the value: the value of a logarithmic criterion
+    /// contains a constant that depends on the units of the parameters.
     fn gradient_scale(&self, columns: usize) -> f64 {
         self.scale(columns)
     }
@@ -50,10 +50,10 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
         false
     }
 
-    /// Reported value: the criterion without smoothing.
+    /// Value for reports: the criterion without smoothing.
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
 
-    /// Positive form of the reported value, smaller is better, for optimisers that select by 1/H.
+    /// Positive form of the reported value (smaller is better), for optimisers that select by its reciprocal.
     fn fitness(&self, information: &DMatrix<f64>) -> Option<f64> {
         self.figure(information)
     }

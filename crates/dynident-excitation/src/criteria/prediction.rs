@@ -1,24 +1,26 @@
-//! V-optimality: the torque prediction error of the fitted model on a task.
+//! V-optimality: the error with which the identified model predicts torque along a given motion (the task).
 
 use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
-/// `log tr(D⁻¹ M)` with `M = Σ W_taskᵀ Σ⁻¹ W_task / samples`, with derivative `-D⁻¹ M D⁻¹ / tr(D⁻¹ M)`.
+/// `log tr(D⁻¹ M)` with `M = Σ W_taskᵀ Σ⁻¹ W_task / samples` and derivative `-D⁻¹ M D⁻¹ / tr(D⁻¹ M)`. D is the
+/// information matrix of the excitation motion, W_task the regressor of the task, and Σ⁻¹ the inverse covariance of
+/// the torque noise.
 ///
-/// The covariance of a prediction `W_task θ̂` is `W_task D⁻¹ W_taskᵀ`. Its trace, each joint measured in its own torque
-/// noise and averaged over the task's samples, is `tr(D⁻¹ M)`: the mean square of the prediction error that the
-/// parameters' uncertainty causes, all joints summed, in units of the torque noise's variance. Fedorov, Theory of
-/// Optimal Experiments (1972), section 2.7; called V- or I-optimality.
+/// The covariance of a torque prediction `W_task θ̂` is `W_task D⁻¹ W_taskᵀ`. `tr(D⁻¹ M)` is its trace, with each
+/// joint scaled by its torque noise, averaged over the samples of the task. It is the mean square of the prediction
+/// error due to the parameters' uncertainty, summed over all joints, in units of the torque noise's variance.
+/// Fedorov, Theory of Optimal Experiments (1972), section 2.7; called V- or I-optimality.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     task: DMatrix<f64>,
 }
 
 impl Prediction {
-    /// Creates the criterion for a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the
-    /// information matrix. [`Information::of`](crate::Information::of) computes it from the motion of the task with the
-    /// weight `1 / samples`.
+    /// Creates the criterion for the matrix `M` = `task` of a task: symmetric, positive semi-definite, in the columns
+    /// of the information matrix. [`Information::of`](crate::Information::of) computes it from the motion of the task
+    /// with the weight `1 / samples`.
     pub fn new(task: DMatrix<f64>) -> Self {
         Self { task }
     }

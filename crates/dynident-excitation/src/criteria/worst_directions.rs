@@ -4,15 +4,17 @@ use super::{Criterion, ValueAndGradient};
 use crate::symmetric_eigen::SymmetricEigen;
 use nalgebra::DMatrix;
 
-/// `log ‖1/λ‖_p` of the eigenvalues λ of `Tᵀ D T`, with derivative `-T U diag(λ^(-p-1)) Uᵀ Tᵀ / Σ λ^-p`: the p-norm of
-/// the variances along the axes of the confidence ellipsoid of `x`, where `θ = T x`. Order 1 is A-optimality of x (mean
-/// variance), infinity is E-optimality (largest variance); an order in between weights the directions with the largest
-/// variances. Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993), chapter 6.
+/// `log ‖1/λ‖_p` of the eigenvalues λ of `Tᵀ D T`, with derivative `-T U diag(λ^(-p-1)) Uᵀ Tᵀ / Σ λ^-p`. D is the
+/// information matrix; the columns of T are the units in which the parameters θ are measured, `θ = T x`. The value is
+/// the p-norm of the variances along the axes of the confidence ellipsoid of `x`. Order 1 is A-optimality of x (mean
+/// variance), infinity is E-optimality (largest variance); an order in between weights the directions with the
+/// largest variances. Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993),
+/// chapter 6.
 ///
 /// With `T Tᵀ = M⁻¹`, where M is the mean information of a sample of some motions, the variances are those of the
-/// torque predicted along these motions, and order 1 is [`Prediction`](super::Prediction). Unlike this criterion,
-/// D-optimality (`-log det`) gains as much from doubling the information of a well determined direction as from
-/// doubling that of a poorly determined one.
+/// torque predicted along these motions. Order 1 is then [`Prediction`](super::Prediction). For D-optimality (`-log
+/// det`), doubling the information of a well determined direction gains as much as doubling that of a poorly
+/// determined direction; this criterion prefers the latter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KieferPhiP {
     units: DMatrix<f64>,
@@ -41,7 +43,7 @@ impl Criterion for KieferPhiP {
         if !(smallest > 0.0 && smallest.is_finite()) {
             return None;
         }
-        // Relative to the largest term, so that no power overflows.
+        // The terms are divided by the largest, so that no power overflows.
         let shares: Vec<f64> = eigen.values.iter().map(|value| (smallest / value).powf(self.order)).collect();
         let sum: f64 = shares.iter().sum();
         let slopes: Vec<f64> = eigen.values.iter().zip(&shares).map(|(value, share)| -share / (sum * value)).collect();

@@ -1,4 +1,4 @@
-//! Assessment of a trajectory with every logged sample, and every limit between samples.
+//! Assessment of a trajectory: information from every logged sample, and every limit also between samples.
 
 use super::{DesignTask, grid};
 use crate::criteria::Criterion;
@@ -41,7 +41,7 @@ pub(crate) fn assess(
     task.family.motion(&parameters, logged, &mut motion);
     let information =
         Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
-    // Finer than the grids of the search, so that no peak between samples is missed.
+    // Finer than the grids of the search, so that no peak between its samples is missed.
     let dense = grid(task.family.duration_s(), (4 * fine.len()).max(MIN_PEAK_SAMPLES));
     let extremes = extremes(task, &parameters, &dense);
     let violation = extremes.iter().copied().fold(f64::NEG_INFINITY, f64::max);

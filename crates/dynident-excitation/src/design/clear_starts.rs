@@ -1,8 +1,9 @@
-//! Random starts that stay clear of floor, column and other links.
+//! Random starts that keep clear of floor, column and other links.
 //!
-//! A descent reduces violations but does not lead an arm around an obstacle that it passes through: in the middle of a
-//! column no direction is downhill. The starts are therefore drawn outside obstacles: a posture that keeps the place
-//! limits, and a motion within ranges that are narrowed around it until the whole motion keeps them.
+//! A descent reduces violations, but it does not lead an arm around an obstacle that it passes through: in the middle
+//! of a column no direction reduces the violation. The starts are therefore drawn outside obstacles. First a posture
+//! is drawn that keeps the place limits, then a motion within ranges that are narrowed around the posture until the
+//! whole motion keeps them.
 
 use super::{DesignTask, ranges};
 use crate::limits::LimitWorkspace;
@@ -13,7 +14,7 @@ use dynident_model::sample::Random;
 const MAX_POSTURES: usize = 24;
 const MAX_NARROWINGS: usize = 8;
 
-/// Largest violation of places of an acceptable start; a descent corrects it.
+/// Largest violation of place limits at which a start is accepted; a descent corrects it.
 const MAX_START_VIOLATION: f64 = 0.02;
 
 pub(super) struct Starts<'a> {
@@ -47,8 +48,8 @@ impl<'a> Starts<'a> {
         starts
     }
 
-    /// Returns the next start: the family's random start if no places are limited, else the first start that is clear
-    /// enough, or the clearest of those tried.
+    /// Returns the next start: the family's random start if there are no place limits, otherwise the first start with
+    /// a small enough violation, or the best of those tried.
     fn next(&mut self, random: &mut Random, stop: &dyn Fn() -> bool) -> Vec<f64> {
         let mut best = self.task.family.random(&self.positions, &self.speeds, random);
         if !self.task.limits.has_places() {

@@ -1,4 +1,5 @@
-//! Units of the columns in which the information is near one, for criteria to which units only add a constant.
+//! Units of the columns in which the entries of the information are near one, for criteria to which units only add a
+//! constant.
 
 use super::{DesignTask, ranges};
 use crate::criteria::{Criterion, ValueAndGradient};
@@ -7,11 +8,11 @@ use crate::motion::Motion;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// Seed of the motion that determines the units. All searches of a task must use the same one.
+/// Seed of the motion that determines the units. All searches of a task must use the same seed.
 const SEED: u64 = 1;
 
 /// For each column a power of two near `1 / √D_kk`. Products with powers of two are exact: a robot twice as heavy or
-/// long has bitwise the same information in these units, so that its search takes the same steps.
+/// long has bit-identical information in these units, so that its search takes the same steps.
 pub(super) struct ColumnUnits(Vec<f64>);
 
 impl ColumnUnits {
@@ -24,7 +25,7 @@ impl ColumnUnits {
         Self(information.of(&motion, weight).diagonal().iter().map(|d| near_root(*d).recip()).collect())
     }
 
-    /// Value and derivative of the criterion, in these units if the criterion is free of units.
+    /// Value and derivative of the criterion, in these units if units only add a constant to the criterion.
     pub(super) fn value_and_derivative(
         &self,
         criterion: &dyn Criterion,

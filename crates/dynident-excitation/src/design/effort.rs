@@ -1,5 +1,5 @@
-//! Evaluation budget of a search whose settings leave it open: suited to criterion and family, and limited for large
-//! robots.
+//! Evaluation budget of a search whose settings do not define it. It depends on criterion and family, and is limited
+//! for large robots.
 
 use super::{DesignSettings, DesignTask};
 use crate::limits::LimitKind;
@@ -13,16 +13,16 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// For criteria whose converged starts end close to each other. UR10, Panda and iiwa14, five harmonics, three
-    /// seeds: log det is higher than with many short starts in eight of nine cases, in half the time.
+    /// For criteria whose converged starts end close to each other. On UR10, Panda and iiwa14 (five harmonics, three
+    /// seeds), log det is higher than with many short starts in eight of nine cases, in half the time.
     const FEW_LONG: Self = Self { starts: 8, rounds: 1, evaluations_per_start: 1_000, evaluations_per_restart: 1_000 };
-    /// For criteria with many local optima. Descents with enough evaluations to move outside the limits reach better
-    /// optima than four times as many short ones, and restarts around the best improve more than further starts.
-    /// Restarts of 500 evaluations are as good as those of 1,000. Further rounds improved nothing on the arms of
-    /// docs/src/designs-compared.md.
+    /// For criteria with many local optima. Descents that have enough evaluations to move outside the limits reach
+    /// better optima than four times as many short descents. Restarts around the best motion improve more than
+    /// further starts. Restarts of 500 evaluations are as good as restarts of 1,000. More rounds improved nothing on
+    /// the arms of docs/src/designs-compared.md.
     const RESTARTS: Self = Self { starts: 4, rounds: 36, evaluations_per_start: 600, evaluations_per_restart: 500 };
     /// For criteria with many local optima and families with many parameters: descents are long, starts end close to
-    /// each other, and restarts around the best improve more than further starts.
+    /// each other, and restarts around the best motion improve more than further starts.
     const LONG_RESTARTS: Self =
         Self { starts: 2, rounds: 8, evaluations_per_start: 2_000, evaluations_per_restart: 2_000 };
 
@@ -79,18 +79,19 @@ const MIN_PARAMETERS_FOR_LONG_RESTARTS: usize = 24;
 const MIN_STARTS: usize = 2;
 const MIN_EVALUATIONS: usize = 60;
 
-/// Maximum number of products of a design of open length, about a minute on one core. Arms stay below it; a humanoid
-/// with self-collision limits does not.
+/// Maximum number of products (floating-point multiplications) of a design whose effort is not set, about a minute on
+/// one core. Arms stay below it; a humanoid with self-collision limits does not.
 const MAX_PRODUCTS: f64 = 1e12;
 
-/// Shares of [`MAX_PRODUCTS`]: searches, polishes, search for feasibility alone, and search for changes of limits.
+/// Shares of [`MAX_PRODUCTS`] for: searches, polishes, search for feasibility alone, and search for changes of
+/// limits.
 const SEARCH_SHARE: f64 = 0.4;
 const POLISH_SHARE: f64 = 0.25;
 const RESTORATION_SHARE: f64 = 0.2;
 const CHANGES_SHARE: f64 = 0.15;
 
-/// Equivalent number of products of the distance of two links at one sample, for bodies with some dozen corners.
-/// Includes a share of the check between samples after a search.
+/// Cost of computing the distance of two links at one sample, as a number of products, for bodies with some dozen
+/// corners. Includes a share of the check between samples after a search.
 const PRODUCTS_PER_PAIR: f64 = 4000.0;
 
 fn is_open(settings: &DesignSettings) -> bool {
@@ -111,17 +112,17 @@ fn affordable_evaluations(task: &DesignTask<'_>, samples: usize, share: f64) -> 
     (share * MAX_PRODUCTS / one.max(1.0)) as usize
 }
 
-/// Evaluations of all polishes of an open search together; unlimited for other searches.
+/// Number of evaluations of all polishes together if the effort of the search is not set; otherwise unlimited.
 pub(super) fn polish_budget(task: &DesignTask<'_>, settings: &DesignSettings, samples: usize) -> usize {
     if is_open(settings) { affordable_evaluations(task, samples, POLISH_SHARE) } else { usize::MAX }
 }
 
-/// Evaluations of the search for feasibility alone of an open search; unlimited for other searches.
+/// Number of evaluations of the search for feasibility alone if the effort is not set; otherwise unlimited.
 pub(super) fn restoration_budget(task: &DesignTask<'_>, settings: &DesignSettings, samples: usize) -> usize {
     if is_open(settings) { affordable_evaluations(task, samples, RESTORATION_SHARE) } else { usize::MAX }
 }
 
-/// Evaluations of the search for changes of limits of an open search; unlimited for other searches.
+/// Number of evaluations of the search for changes of limits if the effort is not set; otherwise unlimited.
 pub(super) fn single_change_budget(task: &DesignTask<'_>, settings: &DesignSettings, samples: usize) -> usize {
     if is_open(settings) { affordable_evaluations(task, samples, CHANGES_SHARE) } else { usize::MAX }
 }

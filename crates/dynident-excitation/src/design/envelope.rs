@@ -1,5 +1,5 @@
-//! Cholesky factorisation of a sparse matrix. Each row is stored from its first nonzero entry, where the row of the
-//! factor begins too.
+//! Cholesky factorisation of a sparse matrix. Each row is stored from its first nonzero entry; the row of the factor
+//! begins at the same entry.
 //!
 //! George and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), section 4.1. The variables are
 //! reversed, because the first parameter of a periodic spline is coupled to the parameters of both ends and would

@@ -1,23 +1,23 @@
-//! Early end of a design: by the watcher or the time limit.
+//! Early end of a design, by the progress callback (watcher) or the time limit.
 
 use super::{DesignProgress, DesignSettings, DesignWatch};
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Time to move the best motion inside the limits after the watcher ended the search, s.
+/// Time to move the best motion inside the limits after the watcher has ended the search, s.
 const GRACE_S: f64 = 0.5;
 
-/// Evaluations of a polish after the time limit: enough to return inside the limits.
+/// Number of evaluations of a polish after the time limit: enough to return inside the limits.
 pub(super) const EVALUATIONS_AFTER_TIME_LIMIT: usize = 300;
 
-/// Shares of the time limit after which searches and polishes end; the rest is for the return inside the limits and the
-/// check. A search whose best is outside the limits ends early enough for two short polishes, but not before the first
-/// share.
+/// Shares of the time limit after which searches and polishes end. The remaining time is for the return inside the
+/// limits and the check. A search whose best motion is outside the limits ends earlier, so that there is time for two
+/// short polishes, but not before the first share.
 const SEARCH_SHARE: f64 = 0.7;
 const SEARCH_SHARE_INSIDE: f64 = 0.8;
 pub(super) const POLISH_SHARE: f64 = 0.88;
 
-/// Calls the watcher of a design from any thread, stores when it ended the design, and compares the time with the time
-/// limit.
+/// Calls the watcher of a design from any thread, stores whether the watcher ended the design, and compares the
+/// elapsed time with the time limit.
 pub(super) struct Interruption<'a> {
     watch: &'a DesignWatch<'a>,
     elapsed_s: &'a (dyn Fn() -> f64 + Sync),
@@ -25,7 +25,7 @@ pub(super) struct Interruption<'a> {
     evaluations: AtomicU64,
     /// Whether the best motion so far keeps the limits well enough for the polish.
     inside: AtomicBool,
-    /// Bits of the time of the end, s; infinite before.
+    /// Time of the end as bits of a float, s; infinite before the end.
     ended_s: AtomicU64,
 }
 
@@ -90,8 +90,8 @@ impl<'a> Interruption<'a> {
         self.is_past(self.search_share())
     }
 
-    /// Share of the time limit after which the search ends, so that its best can be polished and moved inside the
-    /// limits in time. A motion inside needs little time.
+    /// Share of the time limit after which the search ends, so that its best motion can be polished and moved inside
+    /// the limits in time. A motion that is already inside needs little time.
     pub(super) fn search_share(&self) -> f64 {
         match (self.time_limit_s, self.evaluations()) {
             _ if self.inside.load(Ordering::Relaxed) => SEARCH_SHARE_INSIDE,

@@ -1,8 +1,8 @@
 //! Curvature of the augmented Lagrangian, joint by joint.
 //!
-//! Limits of a single joint depend only on the parameters of that joint. The curvature of the active ones is known
-//! (exactly for linear families, to first order for others) and need not be learnt from steps. The curvature of the
-//! criterion is approximated by the size of the motion in units of its limits.
+//! Limits of a single joint depend only on the parameters of that joint. The curvature of active limits is therefore
+//! known (exactly for linear families, to first order for others) and need not be learnt from steps. The curvature of
+//! the criterion is approximated by the size of the motion in units of its limits.
 
 use super::DesignTask;
 use super::envelope::EnvelopeFactor;
@@ -10,8 +10,8 @@ use crate::motion::Motion;
 use crate::optimisers::{CurvatureFacts, Step};
 use nalgebra::{DMatrix, DVectorView};
 
-/// `σ G + C`, one block per joint: `G` is the mean square of the motion in units of its limits, `C` the curvature of
-/// the active limits, and `σ` the curvature of the criterion, estimated from the last step.
+/// Approximate Hessian `σ G + C`, one block per joint. `G` is the mean square of the motion in units of its limits,
+/// `C` the curvature of the active limits, and `σ` the curvature of the criterion, estimated from the last step.
 pub(super) struct Metric {
     size: Vec<DMatrix<f64>>,
     limits: Vec<DMatrix<f64>>,
@@ -68,9 +68,9 @@ impl Metric {
         true
     }
 
-    /// Computes the curvature of the limits that are active at the parameters `at`, and `σ` from the last step and its
-    /// change of the gradient, or at the start such that the first step is a fifth of the motion. Returns false if the
-    /// matrix is not positive definite.
+    /// Computes the curvature of the limits that are active at the parameters `at`, and `σ` from the last step and
+    /// its change of the gradient. At the start, `σ` is chosen such that the first step is a fifth of the motion.
+    /// Returns false if the matrix is not positive definite.
     pub(super) fn prepare(
         &mut self,
         task: &DesignTask<'_>,

@@ -16,12 +16,12 @@ const RESTORATION_SHARE: f64 = 0.94;
 
 const MAX_POLISHES: usize = 6;
 
-/// Evaluations of a polish after the watcher has ended the search. It also ends after the grace time of
-/// [`Interruption`](super::interruption::Interruption).
+/// Number of evaluations of a polish after the watcher has ended the search. The polish also ends after the grace
+/// time of [`Interruption`](super::interruption::Interruption).
 const EVALUATIONS_AFTER_END: usize = 60;
 
-/// Violation between samples below which shrinking the motion replaces another polish, and the maximum loss by
-/// shrinking, in the criterion's scale.
+/// Violation between samples below which the motion is shrunk instead of polished again; also the maximum loss by
+/// shrinking, in units of the criterion's scale.
 const MAX_SHRINKABLE_VIOLATION: f64 = 3e-4;
 const MAX_SHRINK_LOSS: f64 = 1e-3;
 
@@ -32,8 +32,8 @@ pub(super) struct Polished {
 
 /// Polishes a motion on the fine grid, again with tighter limits while a limit is violated between its samples.
 ///
-/// Returns the best trajectory that keeps all limits everywhere, including `feasible` of the search, or the least
-/// violating one.
+/// Returns the best trajectory that keeps all limits everywhere, including the `feasible` one of the search. If no
+/// trajectory keeps them, returns the one with the smallest violation.
 pub(super) fn polished(
     run: &DesignRun<'_>,
     mut state: AugmentedLagrangianState,
@@ -93,7 +93,7 @@ fn keep_better(kept: &mut Assessment, other: Assessment) {
 
 struct Polish {
     budget: usize,
-    /// Whether the search was ended before: the polish then only returns inside the limits, within some tenths of a
+    /// Whether the search had already ended: the polish then only returns inside the limits, within some tenths of a
     /// second.
     after_end: bool,
 }
@@ -106,7 +106,7 @@ impl Polish {
             (false, true) => EVALUATIONS_AFTER_TIME_LIMIT,
             (false, false) => run.settings.polish_evaluations,
         };
-        // Half of the rest, so that some evaluations remain for limits that are violated between samples.
+        // Half of the remaining evaluations, so that some are left for limits that are violated between samples.
         Self { budget: most.min(left.div_ceil(2).max(1)), after_end }
     }
 
@@ -130,7 +130,7 @@ fn cheaply_shrunk(run: &DesignRun<'_>, outside: &Assessment) -> Option<Assessmen
     None
 }
 
-/// [`shrunk`] on the grids of the run, until the run is overdue.
+/// Does [`shrunk`] on the grids of the run, until the time of the run is over.
 fn made_smaller(run: &DesignRun<'_>, outside: &Assessment) -> Option<Assessment> {
     shrunk(run.task, run.criterion, outside, [&run.fine, &run.logged], &|| run.interruption.is_overdue())
 }
@@ -142,8 +142,8 @@ fn loss(criterion: &dyn Criterion, larger: &Assessment, smaller: &Assessment) ->
 }
 
 /// Moves a polished motion that violates a limit inside the limits: by shrinking, by interpolation towards the
-/// `feasible` motion of the search, or by a search for feasibility alone. After the search was ended, only the first
-/// two run, as time allows.
+/// `feasible` motion of the search, or by a search for feasibility alone. If the search was ended early, only
+/// shrinking and interpolation run, as time allows.
 pub(super) fn moved_inside(
     run: &DesignRun<'_>,
     polished: Polished,

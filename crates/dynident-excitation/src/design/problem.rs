@@ -10,19 +10,19 @@ use crate::motion::Motion;
 use crate::optimisers::{ConstrainedProblem, CurvatureFacts};
 use nalgebra::DMatrix;
 
-/// Weight of a violated place relative to other limits: a search may exceed a joint's limits and return, but must not
-/// cross an obstacle.
+/// Weight of a violated place limit relative to other limits. During a search a motion may exceed a joint's limits
+/// and return, but it must not cross an obstacle.
 const PLACE_WEIGHT: f64 = 5.0;
 
-/// Maximum violation of a place, as a share of its limit (arm lengths for a floor). Penalties alone do not prevent a
-/// long step to the other side of an obstacle. Chosen on the UR10 of the examples, whose wrist crosses its column with
-/// a violation of 0.18; an obstacle that can be crossed with a smaller violation is not enforced by this limit. A limit
-/// of 0.1 stopped descents early.
+/// Maximum violation of a place limit, as a share of the limit (in arm lengths for a floor). Penalties alone do not
+/// prevent a long step to the other side of an obstacle. Chosen on the UR10 of the examples, whose wrist crosses its
+/// column with a violation of 0.18. This limit does not prevent crossing an obstacle with a smaller violation. A
+/// limit of 0.1 stopped descents early.
 const MAX_PLACE_VIOLATION: f64 = 0.16;
 
 pub(super) struct Problem<'a> {
     task: &'a DesignTask<'a>,
-    /// Margins that are added to every value of each row, so that limits are also kept between samples.
+    /// Margins, added to the violation of each row of limits, so that limits are also kept between samples.
     margins: &'a [f64],
     criterion: &'a dyn Criterion,
     units: &'a ColumnUnits,
@@ -32,7 +32,7 @@ pub(super) struct Problem<'a> {
     workspace: LimitWorkspace,
     scales: Vec<f64>,
     scaled_weights: Vec<f64>,
-    /// Maximum violation of places: [`MAX_PLACE_VIOLATION`], or that of the first motion if larger.
+    /// Maximum violation of place limits: [`MAX_PLACE_VIOLATION`], or that of the first motion if larger.
     max_place_violation: Option<f64>,
     parameters: Vec<f64>,
     at_gradient: Vec<f64>,
@@ -86,7 +86,7 @@ impl<'a> Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Whether the motion violates places so much that it may have crossed an obstacle.
+    /// Whether the motion violates place limits so much that it may have crossed an obstacle.
     fn crosses_obstacle(&mut self) -> bool {
         if !self.task.limits.has_places() {
             return false;

@@ -1,4 +1,4 @@
-//! Search for feasibility alone, when a search ends outside the limits.
+//! Search for feasibility alone, if a search ends outside the limits.
 
 use super::assess::{Assessment, assess};
 use super::effort::restoration_budget;
@@ -12,12 +12,12 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// Number of random starts in addition to the best so far, and the minimum evaluations of each descent, so that a small
-/// search can still find a feasible motion.
+/// Number of random starts in addition to the best motion so far, and minimum number of evaluations of each descent,
+/// so that a small search can still find a feasible motion.
 const RANDOM_STARTS: usize = 4;
 const MIN_EVALUATIONS: usize = 400;
 
-/// Maximum number of descents from one start, with wider margins while a limit is violated between samples, and the
+/// Maximum number of descents from one start, with wider margins while a limit is violated between samples; and the
 /// largest increase of a margin.
 const MAX_DESCENTS: usize = 4;
 const MAX_MARGIN_STEP: f64 = 0.02;
@@ -41,25 +41,25 @@ impl Criterion for FeasibilityOnly {
         Some(0.0)
     }
 
-    /// Scale that makes the first penalty about ten with the evaluations of a restoration, because leaving the limits
-    /// gains nothing here.
+    /// Scale that makes the first penalty about ten with the evaluations of this search. The penalty can be high,
+    /// because with a zero objective a motion outside the limits gains nothing.
     fn scale(&self, _: usize) -> f64 {
         50.0
     }
 
-    /// Gradients are those of violations, which are shares of limits.
+    /// The gradients are those of violations, which are shares of limits, so their scale is one.
     fn gradient_scale(&self, _: usize) -> f64 {
         1.0
     }
 }
 
 /// Returns the best motion, if necessary after a search for feasibility alone, and the number of evaluations. The
-/// search starts at the best motion so far and at random ones, until one motion keeps every limit between samples; one
-/// more descent by the criterion follows. Starts run one after another, so that the first success is the same on any
-/// number of threads.
+/// search starts at the best motion so far and at random motions, until one motion keeps every limit between samples.
+/// One more descent by the criterion follows. Starts run one after another, so that the first success is the same for
+/// any number of threads.
 ///
-/// A criterion can keep a search outside: its slope grows without bound as an ill-conditioned motion is forced into
-/// narrow limits, while the penalty grows only in steps.
+/// A criterion can prevent a search from returning inside the limits. Its slope grows without bound when an
+/// ill-conditioned motion is forced into narrow limits, while the penalty grows only in steps.
 pub(crate) fn restored(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
@@ -78,7 +78,7 @@ pub(crate) fn restored(
         ended.load(Ordering::Relaxed)
     };
     let over = || report(0.0, least);
-    // Without a criterion the metric does not bound the steps where no limit is active.
+    // Without a criterion, the metric does not bound the steps in directions without an active limit.
     let [plain, rounds] = [false, true].map(|shaped| Rounds::new(task, fine, logged.len(), shaped));
     let most = restoration_budget(task, settings, fine.len());
     for start in 0..=RANDOM_STARTS {
@@ -86,7 +86,7 @@ pub(crate) fn restored(
             if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };
         let mut margins = vec![INITIAL_MARGIN; task.limits.constraints().len()];
         for _ in 0..MAX_DESCENTS {
-            // A third of the rest, so that evaluations remain for other starts.
+            // A third of the remaining evaluations, so that some are left for other starts.
             let left = most.saturating_sub(evaluations);
             let budget = settings.polish_evaluations.max(MIN_EVALUATIONS).min(left.div_ceil(3).max(1));
             let found = plain.polish(&FeasibilityOnly, &margins, parameters.into(), budget, &|value, violation| {

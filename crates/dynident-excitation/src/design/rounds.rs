@@ -1,4 +1,4 @@
-//! One round of a search: all starts run partially, the best of them until convergence.
+//! One round of a search: all starts run partially, then the best of them run until convergence.
 
 use super::DesignTask;
 use super::column_units::ColumnUnits;
@@ -9,15 +9,15 @@ use crate::optimisers::{
 };
 use core::ops::ControlFlow;
 
-/// First penalty of a limit, as a share of the criterion's scale. It is low, so that a start first finds a good motion
-/// slightly outside the limits and is then led inside. On three arms, five harmonics, ten starts each, 0.02 with slow
-/// growth ends 2 to 4 nats better than 2 with fast growth.
+/// First penalty of a limit, as a share of the criterion's scale. It is low, so that a start first finds a good
+/// motion slightly outside the limits and then moves inside. On three arms with five harmonics and ten starts each,
+/// 0.02 with slow growth gives a log det that is 2 to 4 higher than with fast growth.
 const FIRST_PENALTY: f64 = 0.02;
-/// First penalty where places are limited. With 0.02 a start moves further into obstacles, and more starts are lost
+/// First penalty for tasks with place limits. With 0.02 a start moves further into obstacles, and more starts fail
 /// (UR10 above a table next to a column).
 const FIRST_PENALTY_OF_PLACES: f64 = 0.05;
 const PENALTY_GROWTH: f64 = 3.0;
-/// Evaluations that the slow growth of the penalty needs.
+/// Number of evaluations that the slow growth of the penalty needs.
 const SLOW_PENALTY_EVALUATIONS: f64 = 1000.0;
 
 /// Steps of a descent between two updates of the multipliers; the L-BFGS memory contains all of them. Condition numbers
@@ -25,27 +25,27 @@ const SLOW_PENALTY_EVALUATIONS: f64 = 1000.0;
 /// steps.
 const DESCENT_STEPS: usize = 30;
 
-/// Violation and gradient, in the criterion's scale, at which a polish ends. With 1e-7 and 1e-8 polishes of the Panda
-/// took 1,400 evaluations instead of 350.
+/// Violation, and gradient in units of the criterion's scale, at which a polish ends. With 1e-7 and 1e-8 polishes of
+/// the Panda took 1,400 evaluations instead of 350.
 pub(super) const POLISH_TOLERANCE: f64 = 1e-6;
 
-/// Violation at which starts can be compared.
+/// Violation below which starts can be compared.
 const COMPARISON_TOLERANCE: f64 = 3e-3;
-/// Share of the evaluations after which starts are compared by their value with all limits kept, to first order. For
-/// UR10, Panda and iiwa14, 40 starts each, the ranks after 270 to 300 of 700 evaluations correlate with the final ranks
-/// by 0.7 to 0.9, after 170 by 0.4 to 0.6.
+/// Share of the evaluations after which starts are compared. They are compared by their value with all limits kept,
+/// to first order. For UR10, Panda and iiwa14, 40 starts each, the ranks after 270 to 300 of 700 evaluations
+/// correlate with the final ranks by 0.7 to 0.9; after 170 evaluations the correlation is only 0.4 to 0.6.
 const PARTIAL_RUN_SHARE: f64 = 0.45;
 const MIN_COMPARED_STARTS: usize = 4;
-/// One of this number of starts runs until convergence.
+/// One of this many starts runs until convergence.
 pub(super) const STARTS_PER_FOLLOWED: usize = 4;
-/// [`PARTIAL_RUN_SHARE`] of restarts around a known motion, for a criterion whose starts end close to each other. Log
-/// det of the same arms, 24 seeds, equals that without comparison.
+/// [`PARTIAL_RUN_SHARE`] of restarts around a known motion, for a criterion whose starts end close to each other. On
+/// the same arms with 24 seeds, log det equals that of complete runs without comparison.
 const PARTIAL_RESTART_SHARE: f64 = 0.3;
 const MIN_COMPARED_RESTARTS: usize = 4;
 const FOLLOWED_RESTARTS: usize = 2;
-/// Scores that differ by less, in the criterion's scale, belong to the same motion.
+/// Scores that differ by less than this, in units of the criterion's scale, belong to the same motion.
 const SAME_SCORE_TOLERANCE: f64 = 1e-4;
-/// Weight of the violation when starts are compared, in the criterion's scale.
+/// Weight of the violation when starts are compared, in units of the criterion's scale.
 const VIOLATION_WEIGHT: f64 = 10.0;
 
 /// Returns whether a descent ends after an evaluation with this value and violation; called from any thread.
@@ -54,7 +54,7 @@ pub(super) type Stop<'a> = dyn Fn(f64, f64) -> bool + Sync + 'a;
 #[derive(Clone, Copy)]
 pub(super) struct RoundEnd<'a> {
     pub(super) stop: &'a Stop<'a>,
-    /// Ends the partial runs of all starts; the best ones continue.
+    /// Ends the partial runs of all starts; the best of them continue.
     pub(super) race_is_over: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -70,9 +70,9 @@ pub(super) struct Rounds<'a> {
 pub(super) struct Candidate {
     pub(super) state: AugmentedLagrangianState,
     pub(super) feasible: Vec<f64>,
-    /// Largest violation on the samples at that point.
+    /// Largest violation on the samples at the end of the run.
     pub(super) violation: f64,
-    /// Value for comparison: the criterion as it would be with all limits kept, plus a penalty for the violation.
+    /// Value for comparison: the estimated criterion with all limits kept, plus a penalty for the violation.
     pub(super) score: f64,
 }
 
@@ -80,7 +80,7 @@ pub(super) struct Candidate {
 #[derive(Clone, Copy)]
 pub(super) enum FollowPolicy {
     Always,
-    /// The best ones if their score is below this one; other descents return to a known motion.
+    /// Runs the best starts if their score is below this value; other descents would return to a known motion.
     IfBelow(f64),
     Never,
 }
@@ -100,7 +100,7 @@ impl<'a> Rounds<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs all starts until limits are nearly kept, then the best of them until convergence, subject to the policy.
+    /// Runs all starts until limits are nearly kept, then the best of them until convergence, as the policy allows.
     pub(super) fn run(
         &self,
         criterion: &dyn Criterion,
@@ -133,9 +133,9 @@ impl Rounds<'_> {
         Ok(RoundResult { best, evaluations })
     }
 
-    /// Runs many starts partially, and returns the best of them and the number of evaluations. The known best of
-    /// restarts continues in any case. Restarts for a criterion with many optima are returned unchanged, because those
-    /// that end below the best are often behind it for long.
+    /// Runs many starts partially, and returns the best of them and the number of evaluations. Among restarts, the
+    /// known best motion always continues. For a criterion with many optima, all restarts are returned, because those
+    /// with the best final value often have worse values than others for a long time.
     fn race(
         &self,
         criterion: &dyn Criterion,
@@ -228,7 +228,7 @@ impl Rounds<'_> {
         }
     }
 
-    /// Candidates, best first; equal ones in the order of their starts.
+    /// Candidates, best first; equal candidates in the order of their starts.
     fn candidates(&self, criterion: &dyn Criterion, runs: Vec<AugmentedLagrangianResult>) -> Vec<Candidate> {
         let scale = criterion.scale(self.task.layout.columns().len());
         let mut candidates: Vec<Candidate> = runs

@@ -9,7 +9,7 @@ use crate::optimisers::OptimiserError;
 pub(super) struct DesignRun<'a> {
     pub(super) task: &'a DesignTask<'a>,
     pub(super) settings: &'a DesignSettings,
-    /// Last criterion, which ranks the results.
+    /// Last criterion; it ranks the results.
     pub(super) criterion: &'a dyn Criterion,
     pub(super) coarse: Vec<f64>,
     pub(super) fine: Vec<f64>,

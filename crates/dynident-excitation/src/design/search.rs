@@ -11,16 +11,17 @@ use dynident_model::sample::Random;
 /// Share of the search's time after which only the best start continues.
 const RACE_TIME_SHARE: f64 = 0.55;
 
-/// Violation on the samples of the search that a polish removes in a few evaluations.
+/// Violation on the samples of the search that a polish can remove in a few evaluations.
 const MAX_POLISHABLE_VIOLATION: f64 = 1e-4;
 
-/// Number of first rounds whose best does not run until convergence, in searches with at least [`MANY_ROUNDS`] rounds.
+/// Number of first rounds in which the best start does not run until convergence, in searches with at least
+/// [`MANY_ROUNDS`] rounds.
 const UNFOLLOWED_ROUNDS: usize = 2;
 const MANY_ROUNDS: usize = 8;
 
 const STARTS_ROUND_NAME: &str = "starts";
 
-/// Best motion of all rounds of the search, by the sharpest criterion that was reached.
+/// Best motion of all rounds of the search, by the last criterion that was reached.
 pub(super) fn searched(run: &DesignRun<'_>) -> Result<Candidate, OptimiserError> {
     let DesignRun { task, settings, interruption, .. } = run;
     let effort = Effort::of(task, settings, run.coarse.len());
@@ -45,7 +46,7 @@ pub(super) fn searched(run: &DesignRun<'_>) -> Result<Candidate, OptimiserError>
         let follow_policy = follow_policy(run, &neighbourhood, &effort, round);
         let found = rounds.run(criterion, &margins, &starts, each, follow_policy, end)?;
         interruption.count(found.evaluations);
-        // Scores of another criterion are not comparable, but a descent that was cut short may be far outside the
+        // Scores by another criterion are not comparable. But a descent that was ended early may be far outside the
         // limits.
         let sharper = round < task.criteria.len() && !interruption.search_is_over();
         neighbourhood.take(&found.best, rounds.same(criterion), sharper);
@@ -63,7 +64,7 @@ pub(super) fn searched(run: &DesignRun<'_>) -> Result<Candidate, OptimiserError>
 
 fn follow_policy(run: &DesignRun<'_>, neighbourhood: &Neighbourhood, effort: &Effort, round: usize) -> FollowPolicy {
     match neighbourhood.score() {
-        // Restarts near the best motion find a better one sooner than this search converges.
+        // Restarts near the best motion find a better motion sooner than this descent converges.
         _ if round < UNFOLLOWED_ROUNDS && effort.rounds >= MANY_ROUNDS => FollowPolicy::Never,
         Some(score) if round >= run.task.criteria.len() => FollowPolicy::IfBelow(score),
         _ => FollowPolicy::Always,

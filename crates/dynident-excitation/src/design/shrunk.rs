@@ -1,8 +1,8 @@
 //! Shrinks a motion outside the limits until it keeps them.
 //!
-//! A search always ends with a motion that is slightly outside: by 10⁻⁴ after an interrupted polish, by some hundredths
-//! without polish. The same motion, shrunk by that share around a posture inside the limits, keeps them, and the
-//! criterion changes by about that share.
+//! A search always ends with a motion that is slightly outside the limits: by 10⁻⁴ after an interrupted polish, by
+//! some hundredths without polish. If the motion is shrunk by that share around a posture inside the limits, it keeps
+//! them, and the criterion changes by about that share.
 
 use super::assess::{Assessment, assess, extremes};
 use super::{DesignTask, ranges};
@@ -12,26 +12,26 @@ use dynident_model::sample::Random;
 
 const MAX_SHRINK: f64 = 0.9;
 
-/// Added to each share against violations of 10⁻¹⁶ by rounding.
+/// Added to each share, because rounding can cause violations of 10⁻¹⁶.
 const ROUNDING_MARGIN: f64 = 1e-9;
 
 const MAX_DOUBLINGS: usize = 8;
 
-/// First share if all joints keep their own limits but torques or places are violated.
+/// First share if all joints keep their own limits, but torque or place limits are violated.
 const FIRST_SHARE: f64 = 1.0 / 512.0;
 
-/// Speed and range of a motion at near standstill, as shares of the limits. Not zero, because some families divide by
+/// Speed and range of a motion near standstill, as shares of the limits. Not zero, because some families divide by
 /// the size of the motion.
 const STANDSTILL_SHARE: f64 = 1e-6;
 
-/// Interpolates `outside` towards standstill in the middle of each joint's path, with the smallest of the tried shares
-/// that keeps all limits between samples. `None` if `outside` keeps the limits, if a tenth of the motion is still too
-/// large, or after `stop` returns true.
+/// Interpolates `outside` towards standstill in the middle of each joint's path, with the smallest of the tested
+/// shares that keeps all limits between samples. `None` if `outside` already keeps the limits, if a motion of a tenth
+/// of the size still violates them, or after `stop` returns true.
 ///
-/// For a linear family the shares of joints that violate their own limits are known: limits on a joint's motion are
-/// convex, so on the way to a motion inside a value `v > 0` that ends at `-d` is zero at the share `v / (v + d)` at the
-/// latest, and the other joints need not change. If torques, places or a nonlinear family still violate a limit, larger
-/// shares of all joints are tried.
+/// For a linear family the share of each joint that violates its own limits is known. Limits on a joint's motion are
+/// convex. On the way to a motion inside the limits, a violation `v > 0` that ends at `-d` is therefore zero at the
+/// share `v / (v + d)` at the latest. The other joints need not change. If torque or place limits are still violated,
+/// or the family is nonlinear, larger shares of all joints are tested.
 pub(super) fn shrunk(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,

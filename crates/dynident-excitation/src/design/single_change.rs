@@ -1,5 +1,5 @@
-//! Smallest change of a single limit that makes a motion possible, when no motion keeps all limits. Found by searches
-//! with that limit widened.
+//! Smallest change of a single limit that makes a motion possible, when no motion keeps all limits. The change is
+//! found by searches with that limit widened.
 
 use super::assess::extremes;
 use super::effort::single_change_budget;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 const SEARCH_EVALUATIONS: usize = 300;
 
-/// Maximum number of doublings of a widening; a limit that needs more is not sufficient alone.
+/// Maximum number of doublings of a widening; if more are needed, a change of this limit alone is not sufficient.
 const MAX_WIDENINGS: usize = 3;
 
 const BISECTIONS: usize = 5;
@@ -23,13 +23,13 @@ const RANDOM_STARTS: usize = 1;
 
 const MAX_GROUPS: usize = 6;
 
-/// Violation on samples that a search accepts, and margin of the other limits; the result is then checked between
+/// Violation on samples that a search accepts, and margin of the other limits. The result is then checked between
 /// samples.
 const SAMPLE_MARGIN: f64 = 2e-3;
 
-/// For each kind of limit that the motion of `parameters` violates, and for its worst row alone, the smallest widening
-/// found with which some motion of the family keeps all other limits. Sorted by size, as shares of the limits. Empty if
-/// none was found or `stop` returned true.
+/// Finds, for each kind of limit that the motion of `parameters` violates, and for its most violated row alone, the
+/// smallest widening with which a motion of the family keeps all other limits. Results are sorted by size, as shares
+/// of the limits. Empty if there is no such widening or `stop` returned true.
 ///
 /// # Errors
 /// Errors of [`design`](crate::design()).
@@ -56,7 +56,7 @@ pub fn single_changes(
         }
         let Some(change) = smallest_widening(task, settings, parameters, &fine, &worst, &rows, stop)? else { continue };
         let size = change.iter().map(|widened| widened.by).fold(0.0, f64::max);
-        // A change of all rows of a kind is redundant if a smaller change of one of them suffices.
+        // A change of all rows of a kind is redundant if a smaller change of one of these rows is sufficient.
         let known = found.iter().any(|(known, of, _)| of.iter().all(|row| rows.contains(row)) && *known <= size);
         if !known && let Some(relaxation) = relaxation(task.limits, &change) {
             found.push((size, rows, relaxation));
@@ -66,7 +66,7 @@ pub fn single_changes(
     Ok(found.into_iter().map(|(_, _, relaxation)| relaxation).collect())
 }
 
-/// Candidates for a single change: the worst row of each violated kind, then all rows of that kind.
+/// Candidates for a single change: the most violated row of each violated kind, then all rows of that kind.
 fn groups(task: &DesignTask<'_>, worst: &[f64]) -> Vec<Vec<usize>> {
     let constraints = task.limits.constraints();
     let mut broken: BTreeMap<_, Vec<usize>> = BTreeMap::new();
@@ -87,8 +87,8 @@ fn groups(task: &DesignTask<'_>, worst: &[f64]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Smallest widening of the rows with which a motion keeps all other limits; returns the widening that this motion
-/// uses.
+/// Smallest widening of the rows with which a motion keeps all other limits; returns the part of the widening that
+/// this motion needs.
 fn smallest_widening(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
@@ -133,8 +133,8 @@ fn smallest_widening(
     Ok(Some(rows.iter().map(used).filter(|widened| widened.by > 0.0).collect()))
 }
 
-/// Searches for a motion that keeps all rows except `rows`, which may be violated by `wide`. Returns the violation it
-/// uses.
+/// Searches for a motion that keeps all rows except `rows`, which may be violated by `wide`. Returns the actual
+/// violation.
 fn motion_with_wider(
     task: &DesignTask<'_>,
     settings: &DesignSettings,

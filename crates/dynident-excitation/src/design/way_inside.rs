@@ -1,23 +1,24 @@
-//! Interpolation from a motion slightly outside the limits towards one inside.
+//! Interpolation from a motion slightly outside the limits towards a motion inside.
 
 use super::DesignTask;
 use super::assess::{Assessment, assess};
 use crate::criteria::Criterion;
 
-/// Maximum violation for which an interpolation is a small change.
+/// Maximum violation at which an interpolation is still a small change.
 const MAX_VIOLATION: f64 = 0.02;
 
-/// First interpolation share, and the number of shares tried; the last one is a half.
+/// First interpolation share, and number of shares tested; the last share is one half.
 const FIRST_SHARE: f64 = 1.0 / 512.0;
 const SHARES: i32 = 9;
 
-/// `(1 - s) outside + s inside`, for the smallest of the shares s = 1/512, 1/256, .., 1/2 that keeps all limits between
-/// samples. `None` if `outside` is inside already or far outside, `inside` violates a limit, the family is not linear
-/// in its parameters, the result is worse than `inside`, or `stop` returns true.
+/// Returns `(1 - s) outside + s inside` for the smallest of the shares s = 1/512, 1/256, .., 1/2 that keeps all
+/// limits between samples. `None` in these cases: `outside` already keeps the limits or is far outside, `inside`
+/// violates a limit, the family is not linear in its parameters, the result is worse than `inside`, or `stop` returns
+/// true.
 ///
-/// In a linear family positions, velocities and accelerations change linearly with the share, and all limits that are
-/// convex in them change by no more than a straight line. A violation ε is therefore removed at a share of about ε, at
-/// a small loss of the criterion.
+/// In a linear family, positions, velocities and accelerations change linearly with the share, and violations of
+/// convex limits change at most linearly. A violation ε is therefore removed at a share of about ε, with a small loss
+/// in the criterion.
 pub(super) fn way_inside(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,

@@ -3,7 +3,8 @@
 use crate::optimisers::Generation;
 use core::fmt::Write;
 
-/// Best, best so far and mean fitness of every generation with 17 digits; values that are not finite are empty.
+/// Table of best, best so far and mean fitness of every generation with 17 digits; values that are not finite are
+/// empty.
 pub fn fitness_csv(history: &[Generation]) -> String {
     let mut text = String::from("generation,best,best_so_far,mean\n");
     let number = |value: f64| if value.is_finite() { format!("{value:?}") } else { String::new() };

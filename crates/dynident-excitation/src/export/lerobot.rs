@@ -8,19 +8,19 @@ use super::ExportError;
 /// Actions of one episode at a constant rate.
 #[derive(Clone, Copy, Debug)]
 pub struct LeRobotEpisode<'a> {
-    /// Kind of the robot.
+    /// Type of the robot, as LeRobot names it.
     pub robot_type: &'a str,
-    /// The task in words.
+    /// Description of the task in words.
     pub task: &'a str,
     /// Frames per second; LeRobot needs a whole number.
     pub rate_hz: f64,
-    /// Names of the actions: `shoulder_pan.pos`.
+    /// Names of the actions, for example `shoulder_pan.pos`.
     pub names: &'a [String],
     /// Values of each action, in LeRobot's units.
     pub actions: &'a [Vec<f64>],
 }
 
-/// The files of a data set: paths, and contents.
+/// The files of a data set: path and content of each.
 pub type EpisodeFiles = Vec<(&'static str, Vec<u8>)>;
 
 /// Paths of the files. The folder `lerobot` is the data set.

@@ -5,7 +5,7 @@ use core::fmt::Write;
 use dynident_text::quoted;
 
 /// A `JointTrajectory` message with positions, velocities and accelerations, for `ros2 topic pub` and parameter files.
-/// Move the arm to the first point before.
+/// Before sending the message, move the arm to the first point.
 ///
 /// # Source
 /// ROS 2 interfaces `trajectory_msgs/msg/JointTrajectory`, `trajectory_msgs/msg/JointTrajectoryPoint`,
@@ -22,8 +22,8 @@ pub fn ros2_joint_trajectory(sampled: &Sampled<'_>) -> Result<String, ExportErro
     Ok(message(sampled.joints, sampled.times_s, point))
 }
 
-/// The same message with positions only, for commands that are held from point to point: `commands` has the values of
-/// each joint. Controllers interpolate linearly between such points.
+/// The same message with positions only, for commands that are held from point to point; `commands` contains the
+/// values of each joint. Controllers interpolate linearly between such points.
 ///
 /// # Errors
 /// Different lengths of names, times and commands; values that are not finite.
@@ -46,7 +46,7 @@ pub fn ros2_commands(joints: &[String], times_s: &[f64], commands: &[Vec<f64>]) 
     Ok(message(joints, times_s, point))
 }
 
-/// The message; `point` gives the lists of a sample with their keys.
+/// Text of the message; `point` gives the lists of a sample with their keys.
 fn message(joints: &[String], times_s: &[f64], point: impl Fn(usize) -> Vec<(&'static str, Vec<f64>)>) -> String {
     let mut text = String::from("header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\njoint_names:\n");
     for name in joints {

@@ -3,7 +3,7 @@
 use super::{ExportError, Sampled};
 use core::fmt::Write;
 
-/// `t_s, q1.., dq1.., ddq1..`, one row per time, SI units, full precision.
+/// Columns `t_s, q1.., dq1.., ddq1..`, one row per time, SI units, full precision.
 ///
 /// # Errors
 /// Different lengths of names, times and motion; values that are not finite.

@@ -6,8 +6,8 @@ use core::fmt::Write;
 /// Settings of the URScript program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UrScriptSettings {
-    /// Rate of the calls, Hz: 125 for CB-series, 500 for e-series. Default 125. The motion must be sampled at this
-    /// rate.
+    /// Rate of the calls, Hz: 125 for CB-series robots, 500 for e-Series robots. Default 125. The motion must be
+    /// sampled at this rate.
     pub rate_hz: f64,
     /// `lookahead_time` of servoj, s, 0.03 to 0.2. Default 0.03, the weakest smoothing.
     pub lookahead_time_s: f64,
@@ -44,7 +44,7 @@ impl UrScriptSettings {
 }
 
 /// Writes a URScript program: a slow `movej` to the first point, one `servoj` per sample, then a stop. The program
-/// contains only positions; the controller computes the rates.
+/// contains only positions; the controller computes velocities and accelerations.
 ///
 /// # Source
 /// Universal Robots, The URScript Programming Language, `movej` and `servoj`.
@@ -58,7 +58,7 @@ pub fn urscript(sampled: &Sampled<'_>, settings: &UrScriptSettings) -> Result<St
         return Err(ExportError::SixJoints { joints: sampled.joints.len() });
     }
     let point = |sample: usize| -> String {
-        // 1e-8 rad, far below the resolution of an encoder.
+        // Eight decimals: a resolution of 1e-8 rad, far below that of an encoder.
         let row: Vec<String> = (0..6).map(|joint| format!("{:.8}", sampled.at(joint, sample)[0])).collect();
         row.join(", ")
     };

@@ -4,7 +4,7 @@ use super::{ExportError, Sampled};
 use core::fmt::Write;
 use dynident_text::csv_field;
 
-/// `t_s, <joint names>`, one row per time, rad (m); names are fields of RFC 4180 ([`csv_field`]).
+/// Columns `t_s, <joint names>`, one row per time, rad (m); names are fields of RFC 4180 ([`csv_field`]).
 ///
 /// # Errors
 /// Different lengths of names, times and motion; values that are not finite.

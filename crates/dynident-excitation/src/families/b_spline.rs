@@ -37,11 +37,11 @@ impl BSplineSettings {
 
 /// q(t) = Σ_i P_i N_i(t) with B-splines of degree 5 on equally spaced knots, the end knots six-fold.
 ///
-/// The first three control points are equal, and so are the last three, so that q̇ = q̈ = 0 exactly at both ends. With
-/// q(T) = q(0) all six are equal and n - 5 parameters per joint are free: the end posture, then P_3 .. P_(n-4), all in
-/// rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on only six spans, so the cost
-/// per sample does not depend on n. Positions are averages of control points and stay between the smallest and the
-/// largest.
+/// The first three control points are equal, and so are the last three, so that q̇ = q̈ = 0 exactly at both ends. If
+/// the motion returns (q(T) = q(0)), all six are equal and n - 5 parameters per joint are free: the end posture, then
+/// P_3 .. P_(n-4), all in rad (m). Otherwise n - 4 parameters are free: start, end, then the inner control points.
+/// Every control point acts on only six spans, so the cost per sample does not depend on n. Positions are weighted
+/// means of control points and stay between the smallest and the largest.
 ///
 /// # Source
 /// de Boor, A Practical Guide to Splines (2001), chapters IX and X; The NURBS Book (Piegl and Tiller 1997), Eqs. 2.5
@@ -72,7 +72,7 @@ impl BSplineBasis {
         if self.settings.returns { 1 } else { 2 }
     }
 
-    /// Knot `index` of the clamped vector, in units of a span.
+    /// Knot `index` of the clamped knot vector, in units of a span.
     fn knot(&self, index: usize) -> f64 {
         index.saturating_sub(DEGREE).min(self.settings.control_points - DEGREE) as f64
     }
@@ -128,8 +128,8 @@ impl Basis for BSplineBasis {
         let per_span = (points - DEGREE) as f64 / self.duration_s;
         let (first, functions) = self.functions(time_s * per_span);
         let scales = [1.0, per_span, per_span.powi(2), per_span.powi(3)];
-        // All functions sum to 1. With one parameter for both ends its function is 1 minus the others, and exactly zero
-        // where no function of the ends is nonzero.
+        // The sum of all functions is 1. With one parameter for both ends, its function is 1 minus the others, and
+        // exactly zero where no function of the ends is nonzero.
         let of_ends = ends == 1 && (first < 3 || first + DEGREE + 3 >= points);
         if of_ends {
             out[0][0] = 1.0;

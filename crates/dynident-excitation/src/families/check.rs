@@ -61,7 +61,7 @@ pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
         for joint in 0..family.joints() {
             let (low, high) = (&orders[order][motion.of(joint)], &orders[order + 1][motion.of(joint)]);
             let size = |values: &[f64]| values.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
-            // Peaks of the whole motion, because rounding of a sum does not decrease where the sum vanishes.
+            // Peaks of the whole motion, because the rounding of a sum does not decrease where the sum is near zero.
             let (peak_low, peak_high) = (size(low), size(high));
             let mut broken = 0;
             for middle in 0..middles.len() {

@@ -13,10 +13,10 @@ const NAME: &str = "fourier";
 pub struct FourierSettings {
     /// Number of harmonics H. Default 5.
     pub harmonics: usize,
-    /// Exact rest (q̇ = q̈ = 0) at both ends. Default true; false selects the plain periodic series.
+    /// Whether both ends are exactly at rest (q̇ = q̈ = 0). Default true; false selects the plain periodic series.
     pub rest: bool,
-    /// Periods within the duration. Default 1. Higher frequencies increase the information, so a long experiment is
-    /// better with several periods.
+    /// Number of periods within the duration. Default 1. Higher frequencies increase the information, so a long
+    /// experiment is better with several periods.
     pub periods: usize,
 }
 
@@ -39,16 +39,16 @@ impl FourierSettings {
     }
 }
 
-/// The finite Fourier series (Swevers et al., IEEE Trans. Robotics and Automation 13(5), 1997),
+/// Finite Fourier series (Swevers et al., IEEE Trans. Robotics and Automation 13(5), 1997),
 ///
 /// q(t) = q0 + Σ_k a_k/(kω) sin kωt + b_k/(kω) cos kωt, k = 1..H, ω = 2π · periods / duration,
 ///
-/// a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of the paper is the same series with coefficients in rad,
-/// here a_k/(kω) and b_k/(kω).
+/// a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of *Iterative Identification of Robot Dynamic
+/// Parameters Based on Logistic Function* is the same series with coefficients in rad, here a_k/(kω) and b_k/(kω).
 ///
-/// Rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0. An orthonormal basis of the null spaces solves
-/// both, so that 2 H - 1 unconstrained parameters per joint are left: q0, then H - 1 for a, then H - 1 for b. Periodic:
-/// q0, a_1..a_H, b_1..b_H.
+/// Rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0. An orthonormal basis of the null spaces
+/// satisfies both, so that 2 H - 1 unconstrained parameters per joint remain: q0, then H - 1 for a, then H - 1 for b.
+/// The periodic series has q0, a_1..a_H, b_1..b_H.
 ///
 /// ```
 /// use dynident_excitation::{Family, families::{Fourier, FourierSettings}};
@@ -63,7 +63,7 @@ pub type Fourier = LinearFamily<FourierBasis>;
 pub struct FourierBasis {
     harmonics: usize,
     omega: f64,
-    /// Rows: free parameters for a (then b); columns: harmonics. `None` if periodic.
+    /// Rows: free parameters for a (then for b); columns: harmonics. `None` for the periodic series.
     rest: Option<[Vec<Vec<f64>>; 2]>,
 }
 
@@ -115,7 +115,7 @@ impl Basis for FourierBasis {
         let half = (out.len() - 1) / 2;
         for k in 1..=self.harmonics {
             let speed = k as f64 * self.omega;
-            // Reduced to one turn, so that both ends have the same angle and rest is exact.
+            // Reduced to one turn, so that both ends have the same angle and are exactly at rest.
             let is_rotary = (time_s * speed / core::f64::consts::TAU).fract();
             let (sin, cos) = (is_rotary * core::f64::consts::TAU).sin_cos();
             let sine = [sin / speed, cos, -speed * sin, -speed * speed * cos];
@@ -141,8 +141,8 @@ impl Basis for FourierBasis {
     }
 }
 
-/// Orthonormal basis of the vectors normal to `normal`: all but the first column of the Householder reflection that
-/// maps `normal` to the first axis.
+/// Orthonormal basis of the vectors normal to `normal`: all columns except the first of the Householder reflection
+/// that maps `normal` to the first axis.
 fn null_space(normal: &[f64]) -> Vec<Vec<f64>> {
     let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut mirror: Vec<f64> = normal.iter().map(|x| x / length).collect();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "friction_ladder";
 
-/// Distribution of the time among the rungs of a [`FrictionLadder`].
+/// Distribution of the time among the velocities (rungs) of a [`FrictionLadder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -33,7 +33,7 @@ pub struct FrictionLadderSettings {
     /// Distribution of the time. Default equal time.
     pub pace: LadderPace,
     /// Whether joints move one after another, each for an equal part of the duration, while the others rest. Default
-    /// false: all at once.
+    /// false: all joints move at the same time.
     pub one_by_one: bool,
 }
 
@@ -62,20 +62,20 @@ impl FrictionLadderSettings {
         )
     }
 
-    /// Time at constant velocity of one joint, s.
+    /// Duration of motion at constant velocity of one joint, s.
     fn cruising_s(&self, joints: usize, duration_s: f64) -> f64 {
         let is_rotary = if self.one_by_one { joints } else { 1 };
         duration_s / is_rotary as f64 - 4.0 * self.rungs as f64 * self.ramp_s
     }
 }
 
-/// Sweeps back and forth at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth
-/// ramps.
+/// Sweeps back and forth at constant velocity: one pair of sweeps for each rung of a ladder of velocities, joined by
+/// smooth ramps.
 ///
-/// q(t) = q_mid + V g(t): the settings fix the shape g, so that a joint has two free parameters: the middle of its
-/// longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; negative begins in the other direction). During
-/// each sweep q̈ = 0 exactly, so that the torque is gravity and friction. The velocity ramps are polynomials with
-/// continuous q̈ and jerk. Both ends are at rest and equal.
+/// q(t) = q_mid + V g(t): the settings define the shape g, so a joint has two free parameters. These are the middle
+/// of its longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; a negative V begins in the other
+/// direction). During each sweep q̈ = 0 exactly, so that the torque is gravity and friction. The velocity ramps are
+/// polynomials with continuous q̈ and jerk. Both ends are at rest at the same posture.
 ///
 /// # Source
 /// Constant-velocity friction identification as in Armstrong-Hélouvry, Control of Machines with Friction (1991).
@@ -151,8 +151,7 @@ impl FrictionLadderBasis {
         sweeps
     }
 
-    /// Distance covered in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp
-    /// subtracted.
+    /// Distance covered in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and a ramp down.
     fn sweep(&self, time_s: f64, cruise_s: f64) -> [f64; 4] {
         let scales = [self.ramp_s, 1.0, 1.0 / self.ramp_s, self.ramp_s.powi(-2)];
         let up = smooth_ramp(time_s / self.ramp_s);

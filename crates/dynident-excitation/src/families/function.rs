@@ -1,4 +1,4 @@
-//! Family from a user's motion function; joints have separate parameters, equally many.
+//! Family from a user's motion function. Joints have separate parameters, the same number each.
 
 use super::error::{FamilyError, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
@@ -12,20 +12,20 @@ use std::sync::Arc;
 
 const NAME: &str = "function";
 
-/// Relative step of a parameter, as a share of `1 + |p|`, for the differences of a nonlinear motion: the cube root of
-/// the rounding.
+/// Relative step of a parameter, as a share of `1 + |p|`, for finite differences of a nonlinear motion: the cube root
+/// of the rounding.
 const RELATIVE_STEP: f64 = 6e-6;
 /// Largest deviation from linearity, as a share of the motion, that is attributed to rounding.
 const LINEARITY_TOLERANCE: f64 = 1e-9;
-/// Largest deviation from 1 of a constant motion.
+/// Largest deviation from 1 of the motion that must be constant 1.
 const CONSTANT_TOLERANCE: f64 = 1e-6;
 const SEED: u64 = 33;
 const MAX_PARAMETERS: usize = 1000;
 
-/// Motion of all joints as a function of their parameters, for many times at once.
+/// Motion of all joints as a function of their parameters, for many instants at once.
 ///
-/// Each joint depends only on its own parameters, and position, velocity, acceleration and jerk are consistent
-/// derivatives.
+/// Each joint depends only on its own parameters. Velocity, acceleration and jerk must be the derivatives of the
+/// position.
 pub trait MotionFunction: Debug + Send + Sync {
     /// Writes the motion at `times_s` into `out`, which already has its size; `parameters` are stored joint after
     /// joint.
@@ -39,17 +39,17 @@ pub struct FunctionFamilySettings {
     pub function: String,
     /// Number of free parameters of each joint, 1 to 1000.
     pub parameters: usize,
-    /// Whether the motion is linear in the parameters and zero at zero. Gradients are then exact, and the function is
-    /// called once for each parameter and grid of times; otherwise the motion is differentiated numerically, with two
-    /// calls for each parameter and step of the search. Default false.
+    /// Whether the motion is linear in the parameters and zero if all parameters are zero. Gradients are then exact,
+    /// and the function is called once for each parameter and grid of times. Otherwise the motion is differentiated
+    /// numerically, with two calls for each parameter and step of the search. Default false.
     pub linear: bool,
 }
 
 /// Family of the motions of a user's [`MotionFunction`].
 ///
 /// A random start draws every parameter from the standard normal distribution. If the family is linear and contains a
-/// constant motion, the start is then scaled to a part of each joint's range and velocity and shifted inside it.
-/// Otherwise the function must create reasonable motions from such parameters.
+/// constant motion, the start is then scaled to a part of each joint's range and velocity limit and shifted into the
+/// range. Otherwise the function must create reasonable motions from such parameters.
 #[derive(Debug)]
 pub struct FunctionFamily {
     function: Arc<dyn MotionFunction>,
@@ -125,7 +125,7 @@ impl FunctionFamily {
         (0..self.parameters).map(of).collect()
     }
 
-    /// Parameters of the constant motion 1, by least squares; `None` without such parameters.
+    /// Parameters of the constant motion with value 1, by least squares; `None` if there are none.
     fn standing(&self, times_s: &[f64]) -> Option<Vec<f64>> {
         let columns = self.columns(times_s);
         let mut standing = Vec::new();
@@ -145,7 +145,8 @@ impl FunctionFamily {
         Some(standing)
     }
 
-    /// Calls `with` for the basis on the grid, or for each of its pieces and the index where it begins.
+    /// Calls `with` for the basis on the grid, or for each of the grid's pieces with the index where the piece
+    /// begins.
     fn on_grid(&self, linear: &Linear, times_s: &[f64], with: impl FnMut(&SampledBasis, usize)) {
         let sample = |times: &[f64]| {
             let columns = self.columns(times);
@@ -216,7 +217,7 @@ impl Family for FunctionFamily {
         if let Some(linear) = &self.linear {
             return self.on_grid(linear, times_s, |basis, from| basis.apply_adjoint(from, adjoint, gradient));
         }
-        // One parameter of every joint at a time, because joints are independent.
+        // One parameter of every joint is changed at a time, because joints are independent.
         let mut moved = parameters.to_vec();
         let mut sides = [Motion::default(), Motion::default()];
         for column in 0..self.parameters {

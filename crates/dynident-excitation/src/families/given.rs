@@ -9,8 +9,8 @@ use dynident_model::sample::Random;
 const NAME: &str = "given";
 
 /// A motion defined by samples, as a family without free parameters. Between two samples it is the quintic polynomial
-/// with q, q̇ and q̈ of both, so that these are exact at the samples and continuous everywhere; the jerk is that of the
-/// polynomial.
+/// with q, q̇ and q̈ of both samples. So q, q̇ and q̈ are exact at the samples and continuous everywhere; the jerk is
+/// that of the polynomial.
 ///
 /// ```
 /// use dynident_excitation::{Family, Motion, families::SampledMotion};

@@ -28,13 +28,13 @@ impl Default for JoinedSettings {
     }
 }
 
-/// A sequence of members, with a move between each two, and from and to given postures.
+/// A sequence of families (members), with a connecting move between each two, and moves from and to given postures.
 ///
 /// A move is the quintic polynomial that matches position, velocity and acceleration at both ends, so that a plain
-/// periodic series can be a member too; between members at rest it is the minimum-jerk move. Velocity and acceleration
-/// are continuous everywhere if they are continuous within the members.
+/// periodic series can be a member, too. Between members at rest it is the minimum-jerk move. Velocity and
+/// acceleration are continuous everywhere if they are continuous within the members.
 ///
-/// Parameters: those of the first member (all its joints), of the second, and so on.
+/// Parameters: first those of the first member (all its joints), then those of the second, and so on.
 #[derive(Debug)]
 pub struct FamilySequence {
     members: Vec<Box<dyn Family>>,
@@ -42,7 +42,7 @@ pub struct FamilySequence {
     joints: usize,
 }
 
-/// A member, or the move before member `n` (`n` = number of members: the last move).
+/// A member, or the move before member `n`; if `n` is the number of members, the last move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Piece {
     Member(usize),
@@ -220,7 +220,7 @@ impl Family for FamilySequence {
         check_shapes(self, parameters, times_s, adjoint, gradient);
         let own = self.ranges();
         let arrays = adjoint.arrays();
-        // Adjoint of both ends of each member through the moves.
+        // Adjoint of both ends of each member, propagated through the moves.
         let mut ends = vec![Motion::default(); self.members.len()];
         for end in &mut ends {
             end.reset(self.joints, 2);

@@ -24,7 +24,7 @@ pub trait Basis: core::fmt::Debug + Send + Sync {
     /// initialised to zero.
     fn row(&self, joint: usize, time_s: f64, out: &mut [[f64; 4]]);
 
-    /// Parameters of the constant motion 1.
+    /// Parameters of the constant motion with value 1.
     fn standing(&self) -> Vec<f64>;
 
     /// Random shape of arbitrary size.
@@ -59,7 +59,8 @@ impl<B: Basis> LinearFamily<B> {
         if self.basis.differs_by_joint() { self.joints } else { 1 }
     }
 
-    /// Calls `with` for the basis on the grid, or for each of its pieces and the index where it begins.
+    /// Calls `with` for the basis on the grid, or for each of the grid's pieces with the index where the piece
+    /// begins.
     fn on_grid(&self, times_s: &[f64], with: impl FnMut(&SampledBasis, usize)) {
         let (columns, sets) = (self.basis.columns(), self.sets());
         let sample = |times: &[f64]| {

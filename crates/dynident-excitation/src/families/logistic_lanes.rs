@@ -88,7 +88,7 @@ pub(super) struct Backward<'a> {
 }
 
 impl Kernel for Backward<'_> {
-    /// Derivatives by (A, c, w, κ) of each stroke.
+    /// Derivatives with respect to (A, c, w, κ) of each stroke.
     type Output = Vec<[f64; 4]>;
     #[inline(always)]
     fn run<T: Lane>(self) -> Vec<[f64; 4]> {
@@ -111,8 +111,8 @@ impl Kernel for Backward<'_> {
                         let unit = lanes_stroke(u, stroke.sharpness);
                         let inverse = T::splat(1.0 / stroke.half_duration_s);
                         let mut scale = T::ONE;
-                        // A shift of the middle by dc is -du·w; a change of w scales u: order n gets -(u S_{n+1} + n
-                        // S_n)/w.
+                        // A shift of the middle by dc changes u by -dc/w; a change of w scales u, so the derivative
+                        // of order n is -(u S_{n+1} + n S_n)/w.
                         let mut local = [T::ZERO; 4];
                         for order in 0..4 {
                             let pull = pulls[order] * scale;

@@ -1,4 +1,4 @@
-//! A logistic stroke with exact rest outside its window.
+//! A logistic stroke (smooth move from one position to another) with exact rest outside its time window.
 
 use dynident_lanes::Scalar;
 
@@ -6,12 +6,13 @@ use dynident_lanes::Scalar;
 ///
 /// s(t) = 1/(1 + e^-φ), φ = κ u/(1 - u²), u = (t - c)/w,
 ///
-/// multiplied by an amplitude, from 0 at t = c - w to 1 at t = c + w. φ tends to ±∞ at the ends of the window, so that
-/// s reaches 0 and 1 there with **all** derivatives zero: the exact soft start and stop that Eq. 11 of the paper
-/// requires. Around the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak velocity Aω/4),
-/// which is the limit everywhere for large κ. κ = 2√3 has the flattest velocity at the middle; κ near 4 is similar to a
-/// minimum-jerk move.
-/// The inverse of φ(u) has a closed form, so position still determines velocity and acceleration.
+/// multiplied by an amplitude, from 0 at t = c - w to 1 at t = c + w. φ tends to ±∞ at the ends of the window, so
+/// that s reaches 0 and 1 there with **all** derivatives zero. This is the exact soft start and stop that Eq. 11 of
+/// *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* requires. Around the middle φ =
+/// ω (t - c) with ω = κ/w: the logistic function of that paper with the same steepness (peak velocity Aω/4), which is
+/// also the limit for large κ. κ = 2√3 has the flattest velocity at the middle; κ near 4 is similar to a minimum-jerk
+/// move.
+/// The inverse of φ(u) has a closed form, so velocity and acceleration are functions of position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogisticStroke {
     /// Distance from start to end, rad (m).
@@ -32,7 +33,7 @@ impl LogisticStroke {
     /// Minimum κ, above which the velocity has a single peak in the middle.
     pub const LEAST_SHARPNESS: f64 = 3.464_101_615_137_755;
 
-    /// The steepness ω = κ/w in 1/s, the paper's ω.
+    /// Steepness ω = κ/w, 1/s.
     pub fn omega(&self) -> f64 {
         self.sharpness / self.half_duration_s
     }
@@ -42,7 +43,7 @@ impl LogisticStroke {
         ((time_s - self.centre_s) / self.half_duration_s).clamp(-MAX_WARP, MAX_WARP)
     }
 
-    /// Derivatives of q, q̇, q̈ and jerk at a time by (amplitude, centre, half duration, sharpness).
+    /// Derivatives of q, q̇, q̈ and jerk at a time with respect to (amplitude, centre, half duration, sharpness).
     pub(super) fn derivatives_by_shape(&self, time_s: f64) -> [[f64; 4]; 4] {
         let u = self.warped(time_s);
         let psi = warp(u);
@@ -51,7 +52,8 @@ impl LogisticStroke {
         let inverse = 1.0 / self.half_duration_s;
         let mut scale = 1.0;
         core::array::from_fn(|order| {
-            // A shift of the middle by dc is -du·w; a change of w scales u: order n gets -(u S_{n+1} + n S_n)/w.
+            // A shift of the middle by dc changes u by -dc/w; a change of w scales u, so the derivative of order n is
+            // -(u S_{n+1} + n S_n)/w.
             let stretched = u * unit.value[order + 1] + order as f64 * unit.value[order];
             let sized = self.amplitude * scale;
             let row = [
@@ -66,7 +68,8 @@ impl LogisticStroke {
     }
 }
 
-/// Derivatives by u of the unit stroke, orders 0 to 4, and of its derivative by κ, orders 0 to 3.
+/// Derivatives with respect to u: of the unit stroke, orders 0 to 4, and of its derivative with respect to κ, orders
+/// 0 to 3.
 pub(super) struct StrokeDerivatives<T> {
     pub(super) value: [T; 5],
     pub(super) by_sharpness: [T; 4],

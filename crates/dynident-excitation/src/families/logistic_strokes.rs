@@ -1,4 +1,4 @@
-//! Several logistic strokes per joint, all joints at once, with exact rest at both ends.
+//! Several logistic strokes (smooth moves) per joint, all joints at once, with exact rest at both ends.
 
 use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::logistic_lanes::{Backward, Forward};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "logistic_strokes";
 const MAX_SHARPNESS: f64 = 40.0;
-/// Bound of the logarithm of the length of a slot relative to the last slot.
+/// Bound of the logarithm of a slot's length relative to the length of the last slot.
 const MAX_LOG_SLOT: f64 = 3.0;
 
 /// Order of the strokes of one joint.
@@ -21,9 +21,10 @@ const MAX_LOG_SLOT: f64 = 3.0;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StrokeOrder {
-    /// A sum of strokes anywhere within the duration: more information, but position does not determine velocity.
+    /// A sum of strokes anywhere within the duration: more information, but velocity is not a function of position.
     Overlapping,
-    /// One after another in slots of free length that fill the duration: position determines velocity on every stroke.
+    /// Strokes one after another in time slots of free length that fill the duration: on every stroke, velocity is a
+    /// function of position.
     Spliced,
 }
 
@@ -38,8 +39,8 @@ pub struct LogisticStrokesSettings {
     pub order: StrokeOrder,
     /// Whether the motion ends at its start position. Default true.
     pub returns: bool,
-    /// κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. A free parameter for spliced
-    /// strokes.
+    /// Sharpness κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. For spliced strokes κ
+    /// is a free parameter.
     pub sharpness: f64,
     /// Maximum steepness ω of overlapping strokes, 1/s. Default 15.
     pub omega_max: f64,
@@ -78,15 +79,16 @@ impl LogisticStrokesSettings {
     }
 }
 
-/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: a generalisation of the paper's Eq. 14 to strokes of unequal
-/// amplitude, steepness and time, with all joints moving at once.
+/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s. This generalises Eq. 14 of *Iterative Identification of Robot
+/// Dynamic Parameters Based on Logistic Function* to strokes of different amplitude, steepness and time, with all
+/// joints moving at once.
 ///
 /// Parameters per joint, in this order:
-/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, positions
-///   τ_1..τ_K in time from 0 (the stroke begins with the motion) to 1 (it ends with the motion). 3 K parameters if the
-///   motion returns.
-/// * spliced: h, A_1..A_K (as above), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 relative to the last slot. 3
-///   K - 1 parameters if the motion returns.
+/// * overlapping: h, A_1..A_K, ω_1..ω_K in 1/s, and positions τ_1..τ_K in time from 0 (the stroke begins with the
+/// motion) to 1 (it ends with the motion). If the motion returns, A_K follows from the other amplitudes and is not a
+/// parameter, so that there are 3 K parameters.
+/// * spliced: h, A_1..A_K (as above), κ_1..κ_K, and logarithms of the lengths of slots 1..K-1 relative to the last
+/// slot. If the motion returns, there are 3 K - 1 parameters.
 ///
 /// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so that both ends are exactly
 /// at rest, with all derivatives zero.
@@ -149,7 +151,7 @@ impl LogisticStrokes {
         1 + self.free_amplitudes() + self.settings.strokes + slots
     }
 
-    /// Lengths of the slots, s, from their logarithms; that of the last slot is zero.
+    /// Lengths of the slots, s, from their logarithms; the logarithm of the last slot is zero.
     fn slots(&self, logarithms: &[f64]) -> Vec<f64> {
         let mut lengths: Vec<f64> = logarithms.iter().map(|x| x.exp()).collect();
         lengths.resize(self.settings.strokes, 1.0);
@@ -160,7 +162,8 @@ impl LogisticStrokes {
         lengths
     }
 
-    /// Converts derivatives by (A, c, w, κ) of each stroke to derivatives by the joint's parameters after h.
+    /// Converts derivatives with respect to (A, c, w, κ) of each stroke to derivatives with respect to the joint's
+    /// parameters after h.
     fn chain(&self, own: &[f64], raw: &[[f64; 4]], gradient: &mut [f64]) {
         let (count, free) = (self.settings.strokes, self.free_amplitudes());
         let closing = if free < count { raw[free][0] } else { 0.0 };
@@ -180,7 +183,8 @@ impl LogisticStrokes {
             }
             StrokeOrder::Spliced => {
                 let lengths = self.slots(fourth);
-                // The length of a slot shifts its own middle by half, and all later middles.
+                // A change of a slot's length shifts the middle of its own stroke by half of the change, and all
+                // later middles by the change.
                 let mut later = 0.0;
                 let mut by_length = vec![0.0; count];
                 for k in (0..count).rev() {
@@ -214,8 +218,9 @@ impl Family for LogisticStrokes {
         self.joints * self.parameters_per_joint()
     }
 
-    /// Overlapping: ω from that of a stroke over the whole duration to the maximum, positions in time from 0 to 1.
-    /// Spliced: κ from 2√3 to 40, slots up to e³ times longer or shorter than the last.
+    /// Bounds for overlapping strokes: ω from that of a stroke over the whole duration to the maximum, positions in
+    /// time from 0 to 1. For spliced strokes: κ from 2√3 to 40, slots at most e³ times longer or shorter than the
+    /// last slot.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let count = self.settings.strokes;
         let (third, fourth) = match self.settings.order {
@@ -238,7 +243,7 @@ impl Family for LogisticStrokes {
             parameters.push(0.0);
             parameters.extend((0..free).map(|_| random.normal()));
             let [least, most] = own[1 + free];
-            // Starts with slow strokes, whose size the limits allow.
+            // Random starts have slow strokes, which can be large within the limits.
             let most = most.min(6.0 * least);
             parameters.extend((0..count).map(|_| least * (most / least).powf(random.uniform(0.0, 1.0))));
             let [low, high] = match self.settings.order {

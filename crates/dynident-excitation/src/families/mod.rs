@@ -2,10 +2,10 @@
 //!
 //! | family | parameters per joint | at rest at the ends |
 //! | --- | --- | --- |
-//! | [`SplicedLogistic`]: the paper's Eqs. 12 to 14 | 2 or 3 | nearly (e^-10) |
+//! | [`SplicedLogistic`]: logistic functions back and forth (Eqs. 12 to 14 of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*) | 2 or 3 | nearly (e^-10) |
 //! | [`LogisticStrokes`]: overlapping or consecutive strokes | 3 K or 3 K - 1 | exactly |
 //! | [`Fourier`]: H harmonics | 2 H + 1, at rest 2 H - 1 | optional |
-//! | [`Quintic`]: piecewise through M waypoints | M - 1, with free rates 3 M - 5 | exactly |
+//! | [`Quintic`]: piecewise through M waypoints | M - 1, with free velocities and accelerations 3 M - 5 | exactly |
 //! | [`BSpline`]: degree 5, n control points | n - 5 | exactly |
 //! | [`Multisine`]: Schroeder phases | 2 | with ramps |
 //! | [`FrictionLadder`]: constant-velocity sweeps | 2 | exactly |

@@ -53,8 +53,8 @@ impl MultisineSettings {
 /// crest factor; A_j is its rms in rad/s (m/s). The joints are shifted in time relative to each other, because equal
 /// motions of two joints would not distinguish their parameters.
 ///
-/// w fades in and out over the ramps with three vanishing derivatives, so that both ends are exactly at rest; between
-/// the ramps whole periods are unchanged, for averaging. Parameters per joint: q0, A.
+/// The window w fades in and out over the ramps with three derivatives that are zero at both ends, so that both ends
+/// are exactly at rest. Between the ramps whole periods are unchanged, for averaging. Parameters per joint: q0, A.
 ///
 /// # Source
 /// Schroeder, Synthesis of low-peak-factor signals, IEEE Trans. Information Theory 16(1), 1970; Pintelon and Schoukens,

@@ -1,7 +1,7 @@
 //! Polynomial pieces shared by several families.
 
-/// The step 35x⁴ - 84x⁵ + 70x⁶ - 20x⁷ from 0 to 1 with three vanishing derivatives at both ends, with its first three
-/// derivatives by x; constant outside 0..1.
+/// Polynomial 35x⁴ - 84x⁵ + 70x⁶ - 20x⁷ that rises from 0 to 1, with three derivatives that are zero at both ends;
+/// constant outside 0..1. Also returns its first three derivatives with respect to x.
 pub(crate) fn smooth_step(x: f64) -> [f64; 4] {
     if x <= 0.0 {
         return [0.0; 4];
@@ -31,7 +31,7 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
     [ramp, step, first, second]
 }
 
-/// The six quintic Hermite functions on 0..`span_s` at `time_s` with their first three derivatives by time: weights of
+/// The six quintic Hermite functions on 0..`span_s` at `time_s`, with their first three time derivatives: weights of
 /// q, q̇, q̈ at the start, then of q, q̇, q̈ at the end.
 ///
 /// # Source
@@ -40,7 +40,7 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
 pub(crate) fn quintic_hermite(time_s: f64, span_s: f64) -> [[f64; 4]; 6] {
     const START: [[f64; 6]; 3] =
         [[1.0, 0.0, 0.0, -10.0, 15.0, -6.0], [0.0, 1.0, 0.0, -6.0, 8.0, -3.0], [0.0, 0.0, 0.5, -1.5, 1.5, -0.5]];
-    // Each end is computed from its own side, so that both are exact.
+    // Each end is computed from its own side, so that the values at both ends are exact.
     let at = |x: f64, sign: f64| -> [[f64; 4]; 3] {
         core::array::from_fn(|end_order| {
             let mut falling = START[end_order];

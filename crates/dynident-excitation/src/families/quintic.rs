@@ -43,13 +43,12 @@ impl QuinticSettings {
 /// Quintic polynomials between waypoints at equal times, with continuous velocity and acceleration, at rest at both
 /// ends.
 ///
-/// Parameters per joint: positions of the waypoints (without the last one if the motion returns), then, with free
-/// rates, q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk can be discontinuous at waypoints.
+/// Parameters per joint: positions of the waypoints (without the last one if the motion returns). With free rates
+/// also q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk can be discontinuous at waypoints.
 ///
 /// # Source
-/// Atkeson, An and Hollerbach, Estimation of inertial parameters of manipulator loads and links, IJRR 5(3), 1986 (the
-/// paper's reference 7): fifth-order polynomials between waypoints; Armstrong, IJRR 8(6), 1989, frees the
-/// accelerations.
+/// Fifth-order polynomials between waypoints: Atkeson, An and Hollerbach, Estimation of inertial parameters of
+/// manipulator loads and links, IJRR 5(3), 1986. Armstrong, IJRR 8(6), 1989, optimises the accelerations.
 pub type Quintic = LinearFamily<QuinticBasis>;
 
 /// Basis functions of a [`Quintic`] family.
@@ -109,7 +108,7 @@ impl Basis for QuinticBasis {
         (0..self.columns()).map(|column| f64::from(u8::from(column < self.positions()))).collect()
     }
 
-    /// The rates have the size of unit steps within one span.
+    /// Random velocities and accelerations have the size of unit moves within one span.
     fn shape(&self, random: &mut Random) -> Vec<f64> {
         let (positions, inner) = (self.positions(), self.settings.way_points - 2);
         (0..self.columns())

@@ -2,8 +2,8 @@
 
 use dynident_model::sample::Random;
 
-/// Scale and shift of the shape `q`, `dq` of one joint, so that it uses a random part (0.3 to 0.9) of the range or of
-/// the velocity limit (whichever is reached first) at a random place inside the range.
+/// Scale and shift of the shape `q`, `dq` of one joint. The scaled motion uses a random part (0.3 to 0.9) of the
+/// position range or of the velocity limit, whichever is reached first, at a random place inside the range.
 ///
 /// An infinite range is replaced by ±π, a velocity limit that is infinite or not positive is ignored, and an empty
 /// range is a single point.

@@ -1,22 +1,23 @@
-//! Basis functions sampled once on a grid, and their two products for linear families.
+//! Basis functions sampled once on a grid, and the two products that linear families need.
 
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Samples in a block, equal to the widest lanes.
+/// Number of samples in a block, equal to the widest SIMD register.
 const BLOCK: usize = 8;
-/// Values of one column in one block: four derivatives (orders 0 to 3).
+/// Number of values of one column in one block: four derivatives (orders 0 to 3).
 const CELL: usize = 4 * BLOCK;
 /// Number of samples above which a grid is processed in pieces that are not stored.
 const MAX_STORED_SAMPLES: usize = 4096;
-/// Maximum number of functions times samples of a grid or piece: 32 MiB.
+/// Maximum number of functions times samples in a table of a grid or piece: 32 MiB.
 const MAX_TABLE_VALUES: usize = 1 << 20;
 /// Number of stored grids per family: search, polish and check grids, and one more.
 const MAX_STORED_GRIDS: usize = 4;
 
-/// One set of columns on one grid. In a block, columns outside `[first, end)` are zero (local support of splines).
+/// One set of columns on one grid. In each block, only the columns in `[first, end)` can be nonzero (local support of
+/// splines).
 #[derive(Debug)]
 struct Columns {
     supports: Vec<[usize; 2]>,
@@ -123,7 +124,7 @@ impl Kernel for Forward<'_> {
     fn run<T: Lane>(self) {
         let Self { basis, parameters, from, out } = self;
         let joints = out.joints;
-        // Two joints share every load of a common basis: eight independent chains hide the latency of multiply-add.
+        // Two joints share every load of a common basis: eight independent sums hide the latency of multiply-add.
         let paired = if basis.sets.len() == 1 { joints / 2 * 2 } else { 0 };
         let blocks = basis.times_s.len().div_ceil(BLOCK);
         for joint in (0..paired).step_by(2) {
@@ -253,7 +254,7 @@ impl Kernel for Backward<'_> {
     }
 }
 
-/// Loads up to a register's lanes of `array` from `at`; the rest is zero.
+/// Loads at most one register of values of `array` from `at`; missing values are zero.
 #[inline(always)]
 pub(crate) fn load_some<T: Lane>(array: &[f64], at: usize, count: usize) -> T {
     if count == T::LANES {
@@ -267,7 +268,7 @@ pub(crate) fn load_some<T: Lane>(array: &[f64], at: usize, count: usize) -> T {
     }
 }
 
-/// The last few grids of a family. The cache affects only the speed.
+/// The last few sampled grids of a family. The cache affects only the speed.
 #[derive(Debug, Default)]
 pub(crate) struct GridCache(RwLock<Vec<Arc<SampledBasis>>>);
 
@@ -279,8 +280,8 @@ impl Clone for GridCache {
 }
 
 impl GridCache {
-    /// Calls `with(basis, from)` for the whole grid if its table is small (sampled once, then stored), else piece by
-    /// piece.
+    /// Calls `with(basis, from)` for the whole grid if its table is small (sampled once, then stored), otherwise for
+    /// one piece after another.
     pub(crate) fn each(
         &self,
         functions: usize,

@@ -1,4 +1,5 @@
-//! The paper's excitation trajectory: logistic functions back and forth.
+//! Excitation trajectory of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* ("the
+//! paper" below): logistic functions back and forth.
 
 use super::error::{FamilyError, MAX_COUNT, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
@@ -14,14 +15,14 @@ const NAME: &str = "spliced_logistic";
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SplicedLogisticSettings {
-    /// ω T. Default 40 (the paper does not state T; |q̇(0)| < 1e-4 rad/s requires about this value). With a given T,
-    /// its minimum.
+    /// Product ω T of steepness and period. Default 40: the paper does not state T, and |q̇(0)| < 1e-4 rad/s requires
+    /// about this value. If the period T is given, this is the minimum of ω T.
     pub period_times_omega: f64,
     /// Period T of each joint, s. Default none: T = `period_times_omega` / ω, which depends on ω.
     pub periods_s: Option<Vec<f64>>,
     /// Offset h of each joint, rad (m). Default none: a free parameter.
     pub offsets: Option<Vec<f64>>,
-    /// Number of periods, after which the joint rests at its start. Default 1.
+    /// Number of periods; afterwards the joint rests at its start. Default 1.
     pub repetitions: usize,
 }
 
@@ -64,7 +65,8 @@ impl SplicedLogisticSettings {
     }
 }
 
-/// The spliced logistic function, Eqs. 12 to 14 of the paper:
+/// The spliced logistic function, Eqs. 12 to 14 of *Iterative Identification of Robot Dynamic Parameters Based on
+/// Logistic Function*:
 ///
 /// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in
 /// the second.
@@ -72,11 +74,11 @@ impl SplicedLogisticSettings {
 /// Parameters per joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak velocity Aω/4, peak acceleration
 /// Aω²/(6√3).
 ///
-/// At the splices the joint is only nearly at rest: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT =
-/// 40), with a velocity of about that times ω, whose sign changes there. [`LogisticStrokes`](super::LogisticStrokes)
-/// are exactly at rest.
+/// At the splices the joint is only nearly at rest. It is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT =
+/// 40). Its velocity is about that distance times ω and changes sign there.
+/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
 ///
-/// Position determines velocity and acceleration.
+/// Velocity and acceleration are functions of position.
 #[derive(Clone, Debug)]
 pub struct SplicedLogistic {
     settings: SplicedLogisticSettings,
@@ -122,7 +124,7 @@ impl SplicedLogistic {
         self.settings.periods_s.as_ref().map_or(self.settings.period_times_omega / omega, |periods| periods[joint])
     }
 
-    /// Argument of the logistic function, its derivative by ω, and the sign of the branch.
+    /// Argument of the logistic function, its derivative with respect to ω, and the sign of the branch.
     fn phase(&self, joint: usize, omega: f64, time_s: f64) -> Phase {
         let period = self.period(joint, omega);
         let given = self.settings.periods_s.is_some();
@@ -167,7 +169,8 @@ impl Family for SplicedLogistic {
         self.joints * self.parameters_per_joint()
     }
 
-    /// Lower bounds of ω, for which all periods fit into the duration, or a given period keeps the minimum of ωT.
+    /// Lower bounds of ω, at which all periods fit into the duration, or the product of ω and a given period T has
+    /// its minimum.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         (0..self.joints)
@@ -199,7 +202,7 @@ impl Family for SplicedLogistic {
         for (joint, own) in parameters.chunks_mut(self.parameters_per_joint()).enumerate() {
             let range = ranges[joint];
             if let Some(offsets) = &self.settings.offsets {
-                // The offset is fixed, so the stroke uses the side with more room.
+                // The offset is fixed, so the motion uses the side with more range.
                 let room = [range[0] - offsets[joint], range[1] - offsets[joint]];
                 let most = if room[1] >= -room[0] { room[1] } else { room[0] };
                 let most = if most.is_finite() { most } else { core::f64::consts::PI };
@@ -207,7 +210,7 @@ impl Family for SplicedLogistic {
                 own[0] = random.uniform(0.3, 0.9) * most.signum() * most.abs().min(fast);
             } else {
                 let span = motion.of(joint);
-                // The grid can miss the middle of a stroke, whose velocity is ω/4.
+                // The grid can miss the middle of a stroke, where the velocity of unit amplitude is ω/4.
                 let peak = [0.25 * own[1]];
                 let [scale, shift] = scale_and_shift(&motion.q[span], &peak, range, speeds[joint], random);
                 own[0] *= scale;

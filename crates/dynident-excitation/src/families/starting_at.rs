@@ -10,9 +10,10 @@ const MIN_RANGE_SHARE: f64 = 0.3;
 
 /// Every motion of another family, shifted joint by joint to start at given positions: `q_j(t) + s_j - q_j(0)`.
 ///
-/// The start is exact by construction, and so is the end of a returning family. Rates are unchanged. Parameters are
-/// those of the family; a parameter that only shifts a joint has no effect if the start of that joint is given. A
-/// family with a fixed posture, such as a joined one with its own start posture, is shifted as a whole.
+/// The start is exact by construction, and so is the end of a family that returns. Velocities and accelerations do
+/// not change. Parameters are those of the family. A parameter that only shifts a joint has no effect if the start of
+/// that joint is given. A family with a fixed posture, such as a sequence with its own start posture, is shifted as a
+/// whole.
 #[derive(Debug)]
 pub struct WithStartPosture {
     inner: Box<dyn Family>,
@@ -63,7 +64,7 @@ impl Family for WithStartPosture {
     }
 
     /// Random start of the family in ranges around the start posture; the search corrects violations of the joint's
-    /// range.
+    /// position range.
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut ranges = ranges.to_vec();
         for (joint, start) in self.given() {
@@ -90,7 +91,7 @@ impl Family for WithStartPosture {
             for q in &mut out.q[own.clone()] {
                 *q += start - q0;
             }
-            // Exact, without rounding of the sum.
+            // Set to the exact value, without rounding of the sum.
             if first.is_none() {
                 out.q[own.start] = start;
             }
@@ -102,7 +103,8 @@ impl Family for WithStartPosture {
         if times_s.is_empty() {
             return;
         }
-        // ∂(s - q(0)): the sum of the adjoints of all positions of a joint, at the start with opposite sign.
+        // Adjoint of s - q(0): the sum of the adjoints of all positions of a joint, added at the start with opposite
+        // sign.
         let mut at_start = Motion::default();
         at_start.reset(adjoint.joints, 1);
         for (joint, _) in self.given() {

@@ -14,7 +14,7 @@ const NAME: &str = "static_postures";
 pub struct StaticPosturesSettings {
     /// Number of postures. Default 10.
     pub postures: usize,
-    /// Share of the duration at rest; the moves divide the rest equally. Default 0.5.
+    /// Share of the duration at rest; the moves share the remaining time equally. Default 0.5.
     pub rest_part: f64,
 }
 
@@ -36,8 +36,8 @@ impl StaticPosturesSettings {
     }
 }
 
-/// K postures, each held for the same time, with moves between them that begin and end with q̇ = q̈ = jerk = 0
-/// (polynomials of degree 7).
+/// K postures, each held for the same time. The moves between them are polynomials of degree 7 that begin and end
+/// with q̇ = q̈ = jerk = 0.
 ///
 /// Parameters per joint: its positions in the K postures, rad (m). The motion begins and ends in a held posture.
 pub type StaticPostures = LinearFamily<StaticPosturesBasis>;

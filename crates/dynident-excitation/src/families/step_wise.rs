@@ -1,4 +1,5 @@
-//! The paper's experiment as one motion: spliced logistic functions of one joint after another, while the others rest.
+//! Experiment of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* as one motion:
+//! spliced logistic functions of one joint after another, while the others rest.
 
 use super::error::FamilyError;
 use super::spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
@@ -14,16 +15,16 @@ const PARAMETERS_PER_STEP: usize = 2;
 pub struct Step {
     /// Index of the joint.
     pub joint: usize,
-    /// Its period T, s.
+    /// Period T of the joint's motion, s.
     pub period_s: f64,
 }
 
 /// [`SplicedLogistic`] of single joints, one after another. Parameters: A in rad (m) and ω in 1/s of each step, in the
 /// order of the steps.
 ///
-/// Before and after its step a joint rests at the start of its function, A/(1 + e^(ωT/4)) from its offset; a joint
-/// without a step rests at its offset. Velocity and acceleration jump at the splices (Eq. 17 of the paper requires less
-/// than 1e-4).
+/// Before and after its own motion a joint rests at the start of its function, A/(1 + e^(ωT/4)) from its offset. A
+/// joint that never moves rests at its offset. Velocity and acceleration are discontinuous at the splices (Eq. 17 of
+/// the paper requires less than 1e-4).
 #[derive(Clone, Debug)]
 pub struct StepWiseLogistic {
     offsets: Vec<f64>,
@@ -39,8 +40,9 @@ struct Turn {
 }
 
 impl StepWiseLogistic {
-    /// Creates the family of motions that move one joint after another, one of `steps` each. `offsets` is the position
-    /// h (rad, m) of each joint from which its motion is counted; ωT and the repetitions are those of `settings`.
+    /// Creates the family of motions that move one joint after another, one for each entry of `steps`. `offsets`
+    /// contains the position h (rad, m) of each joint from which its motion is measured; ωT and the number of
+    /// repetitions are those of `settings`.
     ///
     /// # Errors
     /// Errors of [`SplicedLogistic::new`] for each step.

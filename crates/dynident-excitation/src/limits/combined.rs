@@ -1,23 +1,23 @@
-//! Smallest combination of changes, for motions that no single change makes feasible.
+//! Smallest combination of changes of limits and speed, for motions that no single change makes feasible.
 
 use super::relaxation::{BrokenLimit, MAX_STRETCH, Relaxation, broken_limits, change, stretched};
 use super::set::LimitSet;
 use crate::motion::Motion;
 
-/// Points of the initial grid, and golden-section steps after it, which reduce the interval by 1e-5.
+/// Number of points of the initial grid, and of golden-section steps after it, which reduce the interval by 1e-5.
 const GRID_POINTS: usize = 24;
 const GOLDEN_STEPS: usize = 24;
 
 const MIN_SLOWDOWN: f64 = 1e-3;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Slows the run down by a factor s and widens each limit that is still violated by the necessary amount. The factor
-/// minimises the sum of relative changes, `s - 1 + Σ c_i(s)`.
+/// Slows the motion down by a factor s and widens each limit that is still violated by the necessary amount. The
+/// factor minimises the sum of relative changes, `s - 1 + Σ c_i(s)`.
 ///
-/// `c` is the constraint's value: the violation as a share of the limit, for the floor of the arm's length. A slower
-/// run reduces velocity, acceleration, jerk and the part of the torque that is not gravity, so the sum falls before it
-/// rises. It is evaluated on a grid up to the s whose `s - 1` alone exceeds the sum at s = 1, then refined by golden
-/// section. `None` if a motion is not finite or `stop` returns true.
+/// `c_i` is the violation as a share of the limit (for the floor as a share of the arm's length). Slower motion
+/// reduces velocity, acceleration, jerk and the part of the torque that is not gravity, so the sum first falls and
+/// then rises. It is evaluated on a grid up to the s whose `s - 1` alone exceeds the sum at s = 1, then refined by
+/// golden section. `None` if a motion is not finite or `stop` returns true.
 pub(super) fn smallest_combination(
     set: &LimitSet,
     times_s: &[f64],

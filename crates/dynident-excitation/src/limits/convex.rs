@@ -14,11 +14,11 @@ pub(crate) struct Placed<'a> {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HullDistance {
-    /// Distance, m; 0 if they overlap. Beyond the requested distance a lower bound.
+    /// Distance, m; 0 if the hulls overlap. A distance above the requested one is a lower bound.
     pub distance_m: f64,
     /// Nearest points of the two hulls.
     pub points: [Vec3; 2],
-    /// Unit vector from the second point to the first; for overlapping hulls between their centres.
+    /// Unit vector from the second point to the first; for overlapping hulls, between the centres of the hulls.
     pub direction: Vec3,
 }
 
@@ -53,8 +53,8 @@ impl Placed<'_> {
     }
 }
 
-/// Distance of two hulls. For a distance above `beyond` the result is a lower bound above `beyond`. `guess` stores the
-/// last direction and is the initial one of the next similar query.
+/// Distance of two hulls. If the distance exceeds `beyond`, the result is a lower bound above `beyond`. `guess`
+/// stores the last search direction, which is the initial direction of the next similar query.
 pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, guess: &mut Vec3) -> HullDistance {
     if let ([a, .., b] | [a @ b], [c, .., d] | [c @ d]) = (first.corners, second.corners)
         && first.corners.len() <= 2
@@ -93,7 +93,7 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
         if let Some(known) = &nearest
             && found.square >= known.square
         {
-            // No further decrease because of rounding.
+            // Rounding prevents a further decrease.
             break;
         }
         let largest =
@@ -206,7 +206,7 @@ fn on_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f64; 3] {
     if sum > 0.0 { [va / sum, vb / sum, vc / sum] } else { [1.0, 0.0, 0.0] }
 }
 
-/// The tetrahedron itself if it contains the origin, else the nearest of its faces.
+/// The tetrahedron itself if it contains the origin, otherwise the nearest of its faces.
 fn on_tetrahedron(simplex: &[Corner]) -> SimplexPoint {
     let at = |k: usize| simplex[k].difference;
     let [a, b, c, d] = [0, 1, 2, 3].map(at);

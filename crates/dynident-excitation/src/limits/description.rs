@@ -1,4 +1,4 @@
-//! Limits as a user states them: numbers by joint and link name.
+//! Limits as a user states them: numbers for joints and links, identified by name.
 
 use super::known_torque::KnownTorque;
 use super::link_points::LinkPoint;
@@ -8,7 +8,7 @@ use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// All limits of an experiment. Absent entries do not limit.
+/// All limits of an experiment. A missing entry means no limit.
 ///
 /// In a study file:
 ///
@@ -30,12 +30,12 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Factors on the limits of all joints, for a slower or weaker motion: one number for velocity, acceleration and
-    /// torque, or a table with one for each. Limits that `joints` states are not scaled. 1 by default.
+    /// torque, or a table with one number for each. Limits that are given in `joints` are not scaled. Default 1.
     #[serde(skip_serializing_if = "LimitScale::is_one")]
     pub scale: LimitScale,
     /// Limits of single joints, at most one entry per joint.
     pub joints: Vec<JointLimit>,
-    /// Boxes that points of the arm must not leave (workspace S of the paper).
+    /// Boxes that points of the arm must not leave.
     pub boxes: Vec<BoxLimit>,
     /// Floor that points of the arm must stay above.
     pub floor: Option<FloorLimit>,
@@ -43,13 +43,14 @@ pub struct Limits {
     pub column: Option<ColumnLimit>,
     /// Minimum distances between the arm's own links.
     pub self_collision: Option<SelfCollision>,
-    /// Torque in addition to that of the rigid bodies that torque and power limits include. Not part of files: it comes
-    /// from the robot description and from other knowledge about the drives.
+    /// Torque in addition to that of the rigid bodies that torque and power limits include. Not part of study files:
+    /// it comes from the robot description and from other knowledge about the drives.
     #[serde(skip)]
     pub known_torque: KnownTorque,
 }
 
-/// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are maximum magnitudes.
+/// Limits of one joint; rad (m), seconds, Nm (N), W. Velocity, acceleration, jerk and torque limits are maximum
+/// magnitudes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -80,56 +81,57 @@ pub struct JointLimit {
     pub power_w: Option<f64>,
 }
 
-/// A box in the base frame that points (with their radius) must not leave.
+/// A box in the base frame that points of the arm (with their radius) must not leave.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BoxLimit {
-    /// Range along the base frame's x, m; without it unlimited.
+    /// Range along the base frame's x axis, m; unlimited if missing.
     #[serde(default)]
     pub x_m: Option<[f64; 2]>,
-    /// Range along y, m.
+    /// Range along the base frame's y axis, m; unlimited if missing.
     #[serde(default)]
     pub y_m: Option<[f64; 2]>,
-    /// Range along z, m.
+    /// Range along the base frame's z axis, m; unlimited if missing.
     #[serde(default)]
     pub z_m: Option<[f64; 2]>,
-    /// The points; if empty, the origins of all moving bodies.
+    /// The points that must stay in the box; if empty, the origins of all moving bodies.
     #[serde(default)]
     pub points: Vec<LinkPoint>,
 }
 
-/// The plane `z = height_m` of the base frame that points (with their radius) must stay above.
+/// The plane `z = height_m` of the base frame that points of the arm (with their radius) must stay above.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FloorLimit {
     /// Height of the floor in the base frame, m.
     pub height_m: f64,
-    /// The points; if empty, the shapes below, or without these the origins of all moving bodies.
+    /// The points that must stay above the floor. If empty, `shapes` are used; if these are empty, too, the origins
+    /// of all moving bodies.
     #[serde(default)]
     pub points: Vec<LinkPoint>,
     /// Shapes of links that must stay above the floor.
     #[serde(default)]
     pub shapes: Vec<LinkShape>,
-    /// Amount by which the floor is lower for the shapes of single links, m, for links that are below it in every
-    /// posture.
+    /// Amount by which the floor is lowered for the shapes of single links, m: for links that are below the floor in
+    /// every posture.
     #[serde(default)]
     pub lowered_m: BTreeMap<String, f64>,
 }
 
-/// A cylinder around a line parallel to the base frame's z that points (with their radius) must not enter. It extends
-/// from far below up to `height_m`, or without limit.
+/// A vertical cylinder in the base frame (axis parallel to z) that points of the arm (with their radius) must not
+/// enter. It extends from far below up to `height_m`, or without limit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ColumnLimit {
     /// Radius of the cylinder, m.
     pub radius_m: f64,
-    /// Height of its upper end, z in the base frame, m; unlimited by default.
+    /// Height of the upper end of the cylinder, z in the base frame, m; unlimited by default.
     #[serde(default)]
     pub height_m: Option<f64>,
-    /// Position of its axis: x and y in the base frame, m.
+    /// Position of the axis of the cylinder: x and y in the base frame, m.
     #[serde(default)]
     pub axis_xy_m: [f64; 2],
     /// The points that must stay outside; no default, because points near the base are always inside.
@@ -151,8 +153,8 @@ impl Limits {
         }
     }
 
-    /// Limits of the robot description: position if both ends are given, velocity, and torque from `effort`, which
-    /// includes the description's friction, drive inertia and springs. Acceleration, jerk, power and space are
+    /// Limits of the robot description: position (if both ends are given), velocity, and torque from `effort`, which
+    /// must include the description's friction, drive inertia and springs. Acceleration, jerk, power and space are
     /// unlimited.
     pub fn from_model(model: &Model) -> Self {
         let joints = model.joints().iter().map(|joint| JointLimit {
@@ -166,8 +168,8 @@ impl Limits {
         Self { joints: joints.collect(), known_torque, ..Self::default() }
     }
 
-    /// These limits overridden by those of `other`, joint by joint and value by value. The boxes of `other` are added,
-    /// and its known torque has priority unless it is empty.
+    /// These limits, with values of `other` replacing them joint by joint and value by value. The boxes of `other`
+    /// are added. Its known torque replaces this one unless it is empty.
     pub fn overlaid(mut self, other: &Self) -> Self {
         for over in &other.joints {
             let Some(under) = self.joints.iter_mut().find(|under| under.joint == over.joint) else {
@@ -194,7 +196,7 @@ impl Limits {
         self
     }
 
-    /// Entry of one joint.
+    /// Limits of one joint, if any.
     pub fn of(&self, joint: &str) -> Option<&JointLimit> {
         self.joints.iter().find(|limit| limit.joint == joint)
     }

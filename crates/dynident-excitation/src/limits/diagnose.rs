@@ -1,4 +1,5 @@
-//! Diagnosis of an infeasible motion: violated limits, their places, and the smallest sufficient relaxation.
+//! Diagnosis of an infeasible motion: which limits are violated and where, and the smallest sufficient change of
+//! limits.
 
 use super::combined::smallest_combination;
 use super::kind::{Constraint, LimitKind};
@@ -11,15 +12,15 @@ use crate::motion::Motion;
 /// Violated limits of a motion, and the changes that make it feasible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
-    /// Violated limits, worst first; empty for a feasible motion.
+    /// Violated limits, largest violation first; empty for a feasible motion.
     pub broken: Vec<BrokenLimit>,
-    /// Single sufficient changes, sorted by relative change. If limits of several kinds are violated that no slower run
-    /// fixes, the smallest combination instead. Empty only if the motion is not finite or the search for changes was
-    /// stopped.
+    /// Single sufficient changes, sorted by relative change. If a slower motion is not sufficient and limits of
+    /// several kinds are violated, contains the smallest combination of changes instead. Empty only if the motion is
+    /// not finite or the search for changes was stopped.
     pub relaxations: Vec<Relaxation>,
 }
 
-/// A row of a [`LimitSet`] and the required widening, in the constraint's value.
+/// A row of a [`LimitSet`] and the widening that it requires, in units of the constraint's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Widened {
     pub(crate) row: usize,
@@ -40,9 +41,9 @@ pub(crate) fn relaxation(set: &LimitSet, widened: &[Widened]) -> Option<Relaxati
 
 /// Diagnoses a motion on a dense grid of times (about 1 kHz) that includes both ends.
 ///
-/// Running the same path slower by a factor s divides velocity by s, acceleration by s² and jerk by s³; gravity torque
-/// is unchanged. The smallest s is found by bisection on the constraint values. A slower run cannot fix gravity torque
-/// above a limit, or a violated position, place or distance.
+/// Running the same path slower by a factor s divides velocity by s, acceleration by s² and jerk by s³; gravity
+/// torque does not change. The smallest s is found by bisection on the constraint values. Slower motion cannot
+/// correct a gravity torque above a limit, or a violated limit of position, place or distance.
 ///
 /// # Panics
 /// If the number of times differs from the number of samples.
@@ -50,8 +51,8 @@ pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
     diagnose_until(set, times_s, motion, &|| false)
 }
 
-/// [`diagnose()`] that stops searching for changes when `stop` returns true. The result contains all violated limits
-/// and the changes found so far.
+/// Like [`diagnose()`], but stops searching for changes when `stop` returns true. The result contains all violated
+/// limits and the changes found until then.
 ///
 /// # Panics
 /// If the number of times differs from the number of samples.
@@ -77,7 +78,7 @@ pub fn diagnose_until(set: &LimitSet, times_s: &[f64], motion: &Motion, stop: &d
     Diagnosis { broken, relaxations }
 }
 
-/// The smallest factor at which the stretched motion keeps every limit, rounded up in its ninth digit; `None` if no
+/// The smallest factor at which the slowed-down motion keeps every limit, rounded up in its ninth digit; `None` if no
 /// factor up to 1000 is sufficient or `stop` returns true.
 fn smallest_stretch(set: &LimitSet, motion: &Motion, stop: &dyn Fn() -> bool) -> Option<f64> {
     let mut workspace = set.workspace();
@@ -119,7 +120,7 @@ pub(super) fn amount(constraint: &Constraint, c: f64) -> String {
 }
 
 impl Diagnosis {
-    /// Adds single changes that a search found, and removes combinations, which are then unnecessary.
+    /// Adds single changes that a search found. Removes combinations of changes, which are then unnecessary.
     pub fn take_single(&mut self, found: Vec<Relaxation>) {
         if !found.is_empty() {
             self.relaxations.retain(|known| !matches!(known, Relaxation::Combined { .. }));

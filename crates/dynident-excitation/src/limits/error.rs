@@ -1,4 +1,4 @@
-//! Errors in limits that are found before a motion is searched for.
+//! Errors in limits that are found before the search for a motion.
 
 use super::kind::LimitKind;
 use thiserror::Error;
@@ -83,9 +83,9 @@ pub enum LimitError {
     LowerAboveUpper {
         /// The range.
         what: String,
-        /// Its lower end.
+        /// Lower end of the range.
         lower: f64,
-        /// Its upper end.
+        /// Upper end of the range.
         upper: f64,
     },
     /// The lower and the upper position limit of the joint are equal, also after margins. Widen the range, or lock the
@@ -94,7 +94,7 @@ pub enum LimitError {
     ZeroRange {
         /// Name of the joint.
         joint: String,
-        /// Its only position, rad or m.
+        /// The only allowed position, rad or m.
         position: f64,
     },
     /// The box of the workspace is smaller than the sphere around a point that must stay in it. Enlarge the box, or
@@ -147,7 +147,7 @@ pub enum LimitError {
         kind: LimitKind,
         /// Joint, point or pair of links.
         subject: String,
-        /// Description of the violation.
+        /// Description of the size of the violation.
         amount: String,
     },
     /// The motion must begin and end at rest, and the joint cannot do so in this time. Increase `duration_s`, or raise

@@ -1,4 +1,5 @@
-//! Infeasibility that is detected before a search: a start outside the limits, or a duration too short for any motion.
+//! Infeasibility that is detected before a search: a start outside the limits, or a duration that is too short for
+//! any motion.
 
 use super::description::Limits;
 use super::error::LimitError;
@@ -7,12 +8,12 @@ use super::set::LimitSet;
 use crate::motion::Motion;
 use dynident_model::Model;
 
-/// Tolerance for the rounding of a start exactly on a limit.
+/// Tolerance for rounding errors of a start exactly on a limit.
 const START_TOLERANCE: f64 = 1e-9;
 
 impl Limits {
-    /// Checks that the robot can rest at `q` (rad or m): position, places, distances, and gravity within the torque
-    /// limits.
+    /// Checks that the robot can rest at `q` (rad or m) within the limits of position, places, distances, and torque
+    /// (gravity).
     ///
     /// # Errors
     /// Errors of [`validate`](Limits::validate); the first limit that the posture violates; a wrong length or a value
@@ -68,10 +69,10 @@ impl Limits {
 }
 
 /// Shortest duration, s, from rest to rest over `displacement` (rad or m, not negative) within the given velocity,
-/// acceleration and jerk limits; `None` is no limit.
+/// acceleration and jerk limits; `None` means no limit.
 ///
-/// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section
-/// 3.4, rest at both ends); without a jerk limit the trapezoid. Zero without limits.
+/// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008),
+/// section 3.4, rest at both ends); a trapezoidal profile without a jerk limit. Zero if there are no limits.
 fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
     let d = displacement;
     if d <= 0.0 {

@@ -8,7 +8,8 @@ use super::solids::LinkSolid;
 use super::term::{Adjoint, Inputs, Term};
 use dynident_model::{Model, Vec3};
 
-/// `(lowest - z) / L`, where `z` is the height of a link's lowest point and `L` the arm's length: one row per link.
+/// Constraint `(lowest - z) / L`, one row per link: `z` is the height of a link's lowest point, `lowest` its minimum,
+/// and `L` the arm's length.
 #[derive(Clone, Debug)]
 pub(crate) struct FloorShapes(Vec<(LinkSolid, Constraint)>);
 

@@ -1,11 +1,13 @@
-//! Position and velocity limits of joints that follow others, from the robot description: bands on sums of the motion.
+//! Position and velocity limits of joints that follow other joints (mimic joints), from the robot description: limits
+//! on weighted sums of the followed joints' motions.
 
 use super::kind::{Constraint, LimitKind};
 use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use dynident_model::Model;
 
-/// `|Σ multiplier x + offset - middle| / half - 1`, where `x` are positions or velocities of the followed joints.
+/// Constraint `|Σ multiplier x + offset - middle| / half - 1`, where `x` are positions or velocities of the followed
+/// joints.
 #[derive(Clone, Debug)]
 struct FollowerBand {
     /// Degree of freedom and multiplier of each followed joint.
@@ -17,7 +19,8 @@ struct FollowerBand {
     unit: &'static str,
 }
 
-/// Limits of the followers in the robot description. Independent joints have separate limits, which a study can state.
+/// Limits of the followers in the robot description. A study can give limits of independent joints only; these are
+/// separate.
 fn follower_bands(model: &Model) -> Vec<FollowerBand> {
     let Some(coupling) = model.coupling() else { return Vec::new() };
     let mut bands = Vec::new();

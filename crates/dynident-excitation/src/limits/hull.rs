@@ -6,17 +6,18 @@ use super::self_collision_shapes::LinkShape;
 use dynident_model::collision::Solid;
 use dynident_model::{Transform, Vec3};
 
-/// Number of corners above which a shape is replaced by a coarser one that contains it.
+/// A shape with more corners than this is replaced by a coarser shape that contains it.
 const MAX_EXACT_CORNERS: usize = 32;
 
-/// Directions in which the outermost corners are selected.
+/// Number of directions in which the outermost corners are selected.
 const DIRECTIONS: usize = 40;
 
 const MAX_CLOSE_CORNERS: usize = 80;
 
 impl LinkShape {
-    /// The solid on a link. A solid with many corners, such as a mesh, is replaced by the hull of its outermost corners
-    /// in 40 directions, with a radius that contains all others: it is never smaller than the solid.
+    /// The solid on a link. A solid with many corners, such as a mesh, is replaced by the hull of its outermost
+    /// corners in 40 directions, with a radius that contains all other corners. The replacement is never smaller than
+    /// the solid.
     pub fn holding(link: &str, solid: &Solid) -> Self {
         let Solid { corners_m, radius_m, .. } = solid;
         let (corners, gap_m) = if corners_m.len() <= MAX_EXACT_CORNERS {
@@ -33,12 +34,12 @@ impl LinkShape {
         }
     }
 
-    /// A closer shape around the hull of corners on a link. The farthest corner is added until all are within `gap_m`
-    /// of the hull, or up to 80 corners; the radius contains the rest.
+    /// A closer shape around the hull of corners on a link. The farthest corner is added repeatedly, until all
+    /// corners are within `gap_m` of the hull or there are 80; the radius contains the remaining corners.
     pub(super) fn closely(link: &str, corners_m: &[Vec3], radius_m: f64, gap_m: f64) -> Self {
         let mut hull = if corners_m.len() <= MAX_EXACT_CORNERS { corners_m.to_vec() } else { outermost(corners_m) };
         let mut outside = if hull.len() == corners_m.len() { Vec::new() } else { corners_m.to_vec() };
-        // The distance of a corner only decreases when the hull grows.
+        // When the hull grows, the distance of a corner can only decrease.
         let mut near_m = 0.0_f64;
         let left_m = loop {
             let mut farthest = (0.0, None);

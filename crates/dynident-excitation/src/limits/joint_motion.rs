@@ -1,4 +1,4 @@
-//! Limits of position, velocity, acceleration and jerk of single joints: bands on the motion itself.
+//! Limits of position, velocity, acceleration and jerk of single joints: ranges (bands) of the motion itself.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
@@ -6,7 +6,7 @@ use super::term::{Adjoint, Inputs, Term};
 use super::validate::middle_and_half;
 use dynident_model::Model;
 
-/// `|x - middle| / half - 1` of one of the four arrays of a motion.
+/// Constraint `|x - middle| / half - 1` on one of the four arrays of a motion.
 #[derive(Clone, Debug)]
 struct Band {
     joint: usize,
@@ -58,7 +58,7 @@ fn order(kind: LimitKind) -> usize {
 /// 3) of a single joint: `c = |x - middle| / half - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointBand {
-    /// Row of the set.
+    /// Index of the row in the set.
     pub row: usize,
     pub joint: usize,
     /// Order of the limited derivative of the position.

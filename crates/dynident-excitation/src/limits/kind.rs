@@ -36,7 +36,7 @@ impl LimitKind {
         matches!(self, Self::Speed | Self::Acceleration | Self::Jerk | Self::Torque | Self::Power)
     }
 
-    /// Whether the limit is on places of points of the arm, which depend on several joints.
+    /// Whether the limit concerns the place of points of the arm in space, which depends on several joints.
     pub(crate) fn is_place(self) -> bool {
         matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
     }
@@ -65,9 +65,9 @@ impl fmt::Display for LimitKind {
 
 /// One limit: a row of constraint values over the samples.
 ///
-/// Its value `c` is at most 0 if the limit is kept: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
-/// / size` for a column, `(clearance - distance) / size` between links (at least -0.25), and for the floor `(height +
-/// radius - z) / size`, where size is the arm's length.
+/// The constraint value `c` is at most 0 if the limit is kept. It is `|x - middle| / size - 1` for magnitudes and
+/// ranges, `1 - distance / size` for a column, `(clearance - distance) / size` between links (at least -0.25). For
+/// the floor it is `(height + radius - z) / size`, where size is the arm's length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint {
     /// Kind of the limit.
@@ -76,7 +76,7 @@ pub struct Constraint {
     pub subject: String,
     /// Middle of the range; zero for magnitudes and a column, the height for the floor, the clearance between links.
     pub middle: f64,
-    /// Half width of the range, maximum magnitude, or minimum distance; the scale of `c`.
+    /// Half width of the range, maximum magnitude, or minimum distance. It scales `c`.
     pub size: f64,
     /// Unit of middle and size.
     pub unit: &'static str,

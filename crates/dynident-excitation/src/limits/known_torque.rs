@@ -8,10 +8,10 @@ use dynident_model::terms::{
 
 /// Torque terms with their values. Torque and power limits apply to the sum of these terms and the rigid-body torque.
 ///
-/// Coulomb friction is a sign of the velocity here, also where a study estimates it with a smooth step. At rest it can
-/// have either sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ only at rest.
-/// Friction with hysteresis (Maxwell slip) can have any value up to its yield torque at every sample. Temperature
-/// dependence is not included.
+/// Coulomb friction has the sign of the velocity here, also if a study estimates it with a smoothed sign function. At
+/// rest it can have either sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ
+/// only at rest. Friction with hysteresis (Maxwell slip) can have any value up to its yield torque at every sample.
+/// Temperature dependence is not included.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnownTorque {
     terms: Vec<(TorqueTerm, f64)>,
@@ -48,14 +48,16 @@ impl KnownTorque {
         known
     }
 
-    /// Adds friction or inertia of a joint of the tree that moves by `share` per unit of each of its drivers.
+    /// Adds friction or inertia of a joint of the tree that moves by `share` per unit of motion of each joint it
+    /// follows.
     fn add_of_joint(&mut self, name: &str, drivers: &[(usize, f64)], effect: CouplingEffect, value: f64) {
         let is_coulomb = matches!(effect, CouplingEffect::Coulomb(_));
         if let (&[(first, a), (second, b)], true) = (drivers, drivers.len() == 2) {
             let (name, ratios) = (name.to_owned(), [a, b]);
             self.add(TorqueTerm::Coupling(Coupling { name, first, second, ratios, effect }), value);
         }
-        // A coupling contains the cross terms of inertia and viscous friction, and all Coulomb friction.
+        // A coupling of two joints contains the cross terms of inertia and viscous friction, and all Coulomb
+        // friction.
         if drivers.len() == 1 || (drivers.len() == 2 && !is_coulomb) {
             for &(joint, share) in drivers {
                 let (term, factor) = effect.of_joint(joint, share);
@@ -92,7 +94,7 @@ impl KnownTorque {
         self
     }
 
-    /// The terms and their values. Every Coulomb step is a sign.
+    /// The terms and their values. All Coulomb friction is a sign function of the velocity.
     pub fn terms(&self) -> &[(TorqueTerm, f64)] {
         &self.terms
     }
@@ -142,7 +144,7 @@ fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     out[0]
 }
 
-/// Torque of one unit of sign friction on one joint: lowest and highest, with both signs at rest.
+/// Torque on one joint of sign-function friction with unit size: lowest and highest, with both signs at rest.
 fn step(term: &TorqueTerm, friction: &VelocityFriction<'_>, joint: usize, dq: &[f64], rigid: &[f64]) -> [f64; 2] {
     let joints = term.joints();
     let velocity: f64 = joints.iter().zip(friction.ratios).map(|(&of, ratio)| ratio * dq[of]).sum();

@@ -4,17 +4,17 @@ use super::error::LimitError;
 use dynident_model::{Model, Transform, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A sphere fixed to a link, usually of radius zero: the point whose place is limited.
+/// A sphere fixed to a link, usually of radius zero: a point whose place is limited.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LinkPoint {
     /// Name of the link.
     pub link: String,
-    /// Place in the link's frame, m.
+    /// Position in the link's frame, m.
     #[serde(default)]
     pub at_m: [f64; 3],
-    /// Radius, m.
+    /// Radius of the sphere, m.
     #[serde(default)]
     pub radius_m: f64,
 }
@@ -43,7 +43,7 @@ pub(crate) fn link_place(model: &Model, name: &str, what: &str) -> Result<(Optio
     Err(LimitError::UnknownLink { what: what.to_owned(), link: name.to_owned(), known })
 }
 
-/// The points on their bodies; for an empty list the origins of all moving bodies.
+/// The points with the bodies they are fixed to; for an empty list the origins of all moving bodies.
 pub(crate) fn body_points(model: &Model, points: &[LinkPoint], what: &str) -> Result<Vec<BodyPoint>, LimitError> {
     if points.is_empty() {
         let origins = model.bodies().iter().enumerate().map(|(index, body)| BodyPoint {

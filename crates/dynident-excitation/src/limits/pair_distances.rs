@@ -17,8 +17,8 @@ pub struct PairDistance {
     pub clearance_m: f64,
     /// Distance between the surfaces at each sample, m; negative if they overlap.
     pub distance_m: Vec<f64>,
-    /// Nearest points of the two surfaces at each sample, in the base frame, m. For overlapping shapes the points are
-    /// inside.
+    /// Nearest points of the two surfaces at each sample, in the base frame, m. For overlapping shapes they are
+    /// inside the shapes.
     pub points_m: Vec<[[f64; 3]; 2]>,
 }
 
@@ -30,7 +30,7 @@ impl PairDistance {
 }
 
 impl SelfCollision {
-    /// Computes the distance of every pair of links that must keep one, at every `step`-th sample of a motion.
+    /// Computes the distance of every pair of links with a minimum distance, at every `step`-th sample of a motion.
     ///
     /// # Errors
     /// Errors of [`validate`](SelfCollision::validate).

@@ -1,4 +1,4 @@
-//! Pairs of links that must keep a distance, and the distances.
+//! Pairs of links with a minimum distance, and their distances.
 
 use super::error::LimitError;
 use super::self_collision_shapes::SelfCollision;
@@ -11,11 +11,11 @@ use dynident_model::{Model, Transform};
 pub(crate) struct SolidPairs {
     pub solids: Vec<LinkSolid>,
     pub pairs: Vec<SolidPair>,
-    /// Pairs that are neither adjacent nor ignored, but not checked because their shapes overlap. Define other shapes
-    /// for links that can collide.
+    /// Pairs that are not checked because their shapes overlap, although they are neither adjacent nor ignored.
+    /// Define other shapes for links that can collide.
     pub left_out: Vec<[String; 2]>,
-    /// Pairs that are always closer than the clearance but touch in no tested posture: they are close by design and not
-    /// checked.
+    /// Pairs that are always closer than the clearance but touch in no tested posture. They are close by design and
+    /// not checked.
     pub close: Vec<[String; 2]>,
 }
 
@@ -25,13 +25,13 @@ pub(crate) struct SolidPair {
     pub of: [usize; 2],
     /// Minimum distance between the surfaces, m.
     pub clearance_m: f64,
-    /// Scale of a missing distance, m.
+    /// Length by which a missing distance is divided, m.
     pub size_m: f64,
 }
 
 const POSTURES: usize = 256;
 
-/// Minimum scale of a missing distance, as a share of the arm's length.
+/// Minimum of that length, as a share of the arm's length.
 const MIN_RELATIVE_SIZE: f64 = 0.05;
 
 /// Length of the longest chain of joints from the base, m; the characteristic length of a machine.
@@ -52,7 +52,7 @@ pub fn arm_length_m(model: &Model) -> f64 {
     lengths.into_iter().enumerate().map(tip).fold(0.0, f64::max)
 }
 
-/// Every joint at zero, or as close to zero as the limits of the robot description allow.
+/// Posture with every joint at zero, or as close to zero as the limits of the robot description allow.
 pub fn neutral_posture(model: &Model) -> Vec<f64> {
     let nearest = |joint: &dynident_model::Joint| {
         let (lower, upper) = (joint.limits.lower.unwrap_or(0.0), joint.limits.upper.unwrap_or(0.0));
@@ -61,8 +61,8 @@ pub fn neutral_posture(model: &Model) -> Vec<f64> {
     model.joints().iter().map(nearest).collect()
 }
 
-/// Seeded postures within the limits of the robot description; without limits a full turn, or half a metre to either
-/// side.
+/// Random postures (fixed seed) within the limits of the robot description; without limits within a full turn, or
+/// half a metre to either side.
 pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
     let mut random = Random::new(1);
     let mut posture = || {
@@ -77,9 +77,10 @@ pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
 }
 
 impl SelfCollision {
-    /// Resolves the shapes to their bodies and determines the pairs that must keep a distance: all except those on one
-    /// body, adjacent ones (parent and child) and ignored ones. For **fitted** capsules, pairs that overlap in each of
-    /// 256 seeded postures are also omitted; with `leave_out_touching` those that its documentation describes.
+    /// Assigns the shapes to their bodies and determines the pairs that must keep a distance: all pairs except those
+    /// on one body, adjacent ones (parent and child) and ignored ones. For capsules that were **fitted** to links,
+    /// pairs that overlap in each of 256 random postures are also omitted. With `leave_out_touching`, the pairs that
+    /// its documentation describes are omitted, too.
     ///
     /// # Errors
     /// Errors of [`validate`](SelfCollision::validate).
@@ -153,14 +154,16 @@ impl SolidPairs {
             if always || (touching && neutral && touched as f64 > min_overlap_share * POSTURES as f64) {
                 self.left_out.push(pair.of.map(|place| self.solids[place].link.clone()));
             } else if touching && farthest < pair.clearance_m {
-                // They are close by design; if they touch in some posture, they must not touch.
+                // Pairs that are always within the clearance are close by design. If they touch in some posture, they
+                // must keep a positive distance.
                 if neutral || touched > 0 {
                     kept.push(SolidPair { clearance_m: 0.0, ..*pair });
                 } else {
                     self.close.push(pair.of.map(|place| self.solids[place].link.clone()));
                 }
             } else {
-                // Links that are never far apart keep at most half of their largest distance, so that they can move.
+                // Links that are never far apart must keep at most half of their largest distance, so that they can
+                // move.
                 let most = if touching { 0.5 * farthest } else { pair.clearance_m };
                 kept.push(SolidPair { clearance_m: pair.clearance_m.min(most), ..*pair });
             }

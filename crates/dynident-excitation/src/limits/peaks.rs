@@ -3,14 +3,14 @@
 use super::set::{LimitSet, LimitWorkspace};
 use crate::motion::Motion;
 
-/// Largest value of a row.
+/// Largest value of one row of constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// Row of the set.
+    /// Index of the row in the set.
     pub row: usize,
     /// Largest value; infinite if the motion is not finite.
     pub value: f64,
-    /// Largest value at the given times.
+    /// Largest value among the samples.
     pub sampled: f64,
     /// Time of the largest value, s.
     pub at_s: f64,
@@ -19,15 +19,15 @@ pub struct Peak {
 /// Settings of [`peaks()`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakSettings {
-    /// Sampled maxima of a row are refined if they are at most this far below the largest sample of the row. Rows are
-    /// relative to their limits. 0.1 by default.
+    /// A sampled maximum of a row is refined if it is at most this far below the largest sample of the row.
+    /// Constraint values are relative to their limits. Default 0.1.
     pub band: f64,
-    /// Golden-section steps; each reduces the bracket by 0.618.
+    /// Number of golden-section steps; each reduces the bracket by a factor of 0.618.
     pub steps: usize,
 }
 
 impl Default for PeakSettings {
-    /// Band 0.1 and 32 steps, which reduce two sampling steps to 4e-7 of one.
+    /// Band 0.1 and 32 steps, which reduce a bracket of two sampling intervals to 4e-7 of one.
     fn default() -> Self {
         Self { band: 0.1, steps: 32 }
     }
@@ -43,11 +43,11 @@ struct Bracket {
 
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Finds the largest value of every row between the first and the last of `times_s` (ascending). It refines every
-/// sampled maximum close to the row's largest by golden section. `motion` writes the exact motion at any list of times,
-/// as [`Family::motion`](crate::Family::motion) does.
+/// Finds the largest value of every row between the first and the last of `times_s` (ascending). Every sampled
+/// maximum close to the row's largest value is refined by golden section. `motion` writes the exact motion at any
+/// list of times, like [`Family::motion`](crate::Family::motion).
 ///
-/// Finds every extreme that is a local maximum of the samples; at a jump (in jerk) it finds the side with the larger
+/// Finds every extreme that is a local maximum of the samples; at a discontinuity (of jerk) the side with the larger
 /// samples. All brackets advance together, so the cost is `steps` blocks with one sample per maximum.
 pub fn peaks(
     set: &LimitSet,
@@ -82,7 +82,7 @@ fn peaks_of(
     }
     let mut times = Vec::with_capacity(brackets.len() * 2);
     for step in 0..settings.steps {
-        // The first step evaluates both inner values of a bracket, later ones only the new one.
+        // The first step evaluates both inner points of a bracket, later steps only the new one.
         times.clear();
         for bracket in &brackets {
             times.extend(bracket.inner.iter().filter(|(_, value)| value.is_nan()).map(|(at, _)| *at));
@@ -145,7 +145,7 @@ fn bracket_maxima(peak: &Peak, values: &[f64], times_s: &[f64], band: f64, brack
 }
 
 impl Bracket {
-    /// Removes the outer part next to the lower inner value.
+    /// Removes the outer part of a bracket next to the inner point with the lower value.
     fn narrow(&mut self) {
         let [left, right] = self.inner;
         if left.1 >= right.1 {

@@ -1,17 +1,17 @@
 //! Decomposition of a surface into convex pieces.
 //!
-//! The surface is cut by planes normal to the coordinate axes. Each cut minimises the total volume of the convex hulls
-//! of all pieces; a convex surface is not cut. Triangles are split at the plane, so that the hulls of the pieces
-//! contain every point of the surface, and the inside of a closed one. The greedy selection of planes follows Mamou and
-//! Ghorbel, *A simple and efficient approach for 3D mesh approximate convex decomposition* (ICIP 2009), with the volume
-//! of hulls instead of their concavity and without voxels.
+//! The surface is cut by planes normal to the coordinate axes. Each cut minimises the total volume of the convex
+//! hulls of all pieces; a convex surface is not cut. Triangles are split at the plane, so that the hulls of the
+//! pieces contain every point of the surface, and the interior of a closed surface. The greedy selection of planes
+//! follows Mamou and Ghorbel, *A simple and efficient approach for 3D mesh approximate convex decomposition* (ICIP
+//! 2009), but with the volume of hulls instead of their concavity, and without voxels.
 
 use dynident_model::Vec3;
 
-/// Slabs of a piece along each axis; their borders are the candidate planes.
+/// Number of slabs of a piece along each axis; the borders of slabs are the candidate planes.
 const SLABS: usize = 16;
 
-/// Directions whose outermost points approximate the volume of a hull.
+/// Number of directions whose outermost points approximate the volume of a hull.
 const DIRECTIONS: usize = 48;
 
 /// Minimum reduction of the hull volume by a cut, as a share of the first hull's volume.
@@ -31,7 +31,7 @@ struct Cut {
     at: f64,
 }
 
-/// Corners of at most `most` convex pieces whose hulls contain all triangles.
+/// Corners of at most `most` convex pieces; together the hulls of the pieces contain all triangles.
 pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Vec3>> {
     let directions = spiral(DIRECTIONS);
     let (whole, cut) = best_cut(&triangles, &directions);
@@ -200,8 +200,8 @@ fn half(triangles: &[Triangle], cut: Cut, side: f64) -> Vec<Triangle> {
     kept
 }
 
-/// Volume of the convex hull of a few points, m³; 0 for coplanar points. Each point replaces the faces that are visible
-/// from it by faces to their border.
+/// Volume of the convex hull of a few points, m³; 0 for coplanar points. The hull is built point by point: each point
+/// replaces the faces that are visible from it by faces to their border.
 fn hull_volume(points: &[Vec3]) -> f64 {
     let Some(mut faces) = first_tetrahedron(points) else { return 0.0 };
     let size = points.iter().fold(0.0_f64, |size, point| size.max((*point - points[0]).norm()));

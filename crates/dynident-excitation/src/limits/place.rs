@@ -1,4 +1,4 @@
-//! Box, floor and column: limits on places of points of the arm, in the base frame.
+//! Limits of box, floor and column: places of points of the arm, in the base frame.
 
 use super::description::{BoxLimit, ColumnLimit, FloorLimit};
 use super::error::LimitError;
@@ -15,20 +15,21 @@ enum AllowedRegion {
     Slab { axis: usize, middle: f64, half: f64 },
     /// `(lowest - p_z) / length`.
     Above { lowest: f64, length: f64 },
-    /// `1 - |p_xy - axis| / least`, or `(top - p_z) / least` if that is smaller: next to a column or above it.
+    /// Constraint `1 - |p_xy - axis| / least`, or `(top - p_z) / least` if that is smaller: a point may be next to a
+    /// column or above it.
     Outside { axis: [f64; 2], least: f64, top: f64 },
 }
 
 impl AllowedRegion {
-    /// Critical place on the straight path from `here` to `next`, and its share of the path: the place nearest to the
-    /// axis of a column; otherwise `here`.
+    /// Critical point on the straight path from `here` to `next`, and its share of the path: for a column the point
+    /// nearest to the axis, otherwise `here`.
     fn nearest(&self, here: Vec3, next: Option<Vec3>) -> (Vec3, f64) {
         let (Self::Outside { axis, least, top }, Some(next)) = (self, next) else { return (here, 0.0) };
         let (x, y) = (here[0] - axis[0], here[1] - axis[1]);
         let (dx, dy) = (next[0] - here[0], next[1] - here[1]);
         let length = dx * dx + dy * dy;
         let share = if length > 0.0 { (-(x * dx + y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
-        // The height of the lower end, which decides for the whole path whether it is above the column.
+        // The height of the lower end of the path decides whether the whole path is above the column.
         let place = Vec3([here[0] + share * dx, here[1] + share * dy, here[2].min(next[2])]);
         let beside = 1.0 - (place[0] - axis[0]).hypot(place[1] - axis[1]) / least;
         let above = (top - place[2]) / least;
@@ -64,7 +65,7 @@ impl AllowedRegion {
     }
 }
 
-/// Place of a point at a sample, and at the next one if samples are consecutive.
+/// Position of a point at a sample, and at the next one if samples are consecutive.
 fn path(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<Vec3>) {
     let at = |sample| inputs.placement(point.body, sample).point(point.at);
     let follows = inputs.is_continuous && sample + 1 < inputs.motion.samples;
@@ -139,7 +140,8 @@ impl Term for PlaceLimits {
                     let (place, share) = region.nearest(here, next);
                     let gradient = region.value(place).1.scale(weight);
                     let bodies = inputs.bodies;
-                    // The nearest place moves with both ends; its change along the path has no effect to first order.
+                    // The nearest point moves with both ends of the path; its displacement along the path has no
+                    // effect to first order.
                     adjoint.point(point.body, bodies, sample, here, gradient.scale(1.0 - share));
                     if let Some(next) = next {
                         adjoint.point(point.body, bodies, sample + 1, next, gradient.scale(share));

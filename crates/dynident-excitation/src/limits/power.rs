@@ -5,7 +5,7 @@ use super::kind::{Constraint, LimitKind};
 use super::term::{Adjoint, Inputs, Term};
 use dynident_model::Model;
 
-/// `max(|τ_low q̇|, |τ_high q̇|) / limit - 1`.
+/// Constraint `max(|τ_low q̇|, |τ_high q̇|) / limit - 1`.
 #[derive(Clone, Debug)]
 pub(crate) struct PowerLimits(Vec<(usize, Constraint)>);
 

@@ -14,19 +14,19 @@ pub(super) const MAX_STRETCH: f64 = 1000.0;
 pub struct BrokenLimit {
     /// The limit.
     pub constraint: Constraint,
-    /// Its largest value, above 0.
+    /// Largest constraint value, above 0.
     pub value: f64,
     /// Time of the largest value, s.
     pub at_s: f64,
 }
 
-/// Change of one limit: `(subject, present limit, required limit, unit)`. Ranges are given as half widths.
+/// Change of one limit: `(subject, current limit, required limit, unit)`. Ranges are given as half widths.
 pub type LimitChange = (String, f64, f64, &'static str);
 
 /// A change that makes the motion feasible.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Relaxation {
-    /// The same path run slower: `q(t / factor)`.
+    /// The same path, run more slowly: `q(t / factor)`.
     Stretch {
         /// Factor on the duration, above 1.
         factor: f64,
@@ -49,7 +49,7 @@ pub enum Relaxation {
     },
     /// Several changes with the smallest sum of relative changes, if no single change is sufficient.
     Combined {
-        /// Factor on the duration; 1 without a slower run.
+        /// Factor on the duration; 1 without slower motion.
         factor: f64,
         /// Resulting duration, s.
         duration_s: f64,
@@ -86,7 +86,7 @@ pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     (subject.clone(), now, needed, unit)
 }
 
-/// Motion of `q(t / factor)` at the stretched times.
+/// Motion `q(t / factor)` at the stretched times.
 pub(super) fn stretched(motion: &Motion, factor: f64) -> Motion {
     let scaled = |values: &[f64], by: f64| values.iter().map(|x| x * by).collect();
     let inverse = 1.0 / factor;

@@ -4,8 +4,8 @@ use super::error::LimitError;
 use super::numbers::positive;
 use serde::{Deserialize, Serialize};
 
-/// Factors on the limits of all joints from the robot description and on assumed accelerations, above 0, at most 1. In
-/// a study one number (`scale = 0.8`) or a table (`scale = { speed = 0.8, torque = 0.5 }`).
+/// Factors on the limits of all joints from the robot description and on assumed accelerations, above 0 and at most
+/// 1. In a study they are one number (`scale = 0.8`) or a table (`scale = { speed = 0.8, torque = 0.5 }`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "Stated")]
@@ -18,7 +18,7 @@ pub struct LimitScale {
     pub torque: f64,
 }
 
-/// The forms in a study.
+/// The two notations in a study file.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]

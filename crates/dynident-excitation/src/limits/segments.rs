@@ -19,15 +19,16 @@ pub(crate) struct SegmentDistance {
 /// Distance of the segments `first[0]`-`first[1]` and `second[0]`-`second[1]`, which can be parallel or points.
 ///
 /// The squared distance is convex in the two fractions. Its minimum over the unit square is the stationary point if
-/// that is inside, or lies on one of the four edges, each of which is the distance of an end point from the other
-/// segment (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five candidates are evaluated,
-/// so that no case depends on a threshold for parallelism. Among equal candidates the middle is chosen, for parallel
-/// segments the middle of their overlap. By the envelope theorem the distance changes only with the motion of the two
-/// nearest points along [`direction`](SegmentDistance::direction).
+/// that is inside. Otherwise it lies on one of the four edges, each of which is the distance of an end point from the
+/// other segment (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five candidates are
+/// evaluated, so that no case depends on a threshold for parallelism. Among equal candidates the middle is chosen,
+/// for parallel segments the middle of their overlap. By the envelope theorem the distance changes only with the
+/// motion of the two nearest points along [`direction`](SegmentDistance::direction).
 pub(crate) fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
     let (u, v, w) = (first[1] - first[0], second[1] - second[0], first[0] - second[0]);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
-    // Nearest fraction on one segment to a fraction on the other; a segment of length zero has only its start.
+    // Fraction on one segment that is nearest to a fraction on the other; a segment of length zero has only its
+    // start.
     let fraction =
         |numerator: f64, length2: f64| if length2 > 0.0 { (numerator / length2).clamp(0.0, 1.0) } else { 0.0 };
     let on_second = |s: f64| fraction(uv * s + vw, vv);
@@ -48,7 +49,8 @@ pub(crate) fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDi
         apart.dot(apart)
     });
     let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
-    // Tolerance for the rounding of the five candidates; by convexity averaging adds no more than this.
+    // Tolerance for rounding of the five candidates. Because of convexity, averaging candidates adds no more than
+    // this.
     let tied = least * (1.0 + 1e-12);
     // The minimisers of parallel segments are a line in the square, from its lowest to its highest fraction.
     let (mut low, mut high) = (None, None);
@@ -61,7 +63,7 @@ pub(crate) fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDi
     let at = low.zip(high).map_or(candidates[0], |(low, high)| (0.5 * (low.0 + high.0), 0.5 * (low.1 + high.1)));
     let apart = apart(at);
     let distance_m = apart.norm();
-    // A smaller difference of the points is rounding without a direction.
+    // If the points differ by less, the difference is rounding and has no direction.
     let scale = uu.max(vv).max(w.dot(w)).sqrt();
     let direction = if distance_m > 1e-14 * scale { apart.scale(1.0 / distance_m) } else { normal_to(u, v) };
     SegmentDistance { along_first: at.0, along_second: at.1, distance_m, direction }

@@ -8,11 +8,11 @@ use super::solids::{LinkSolid, SolidDistance, solid_distance};
 use super::term::{Adjoint, Inputs, Term};
 use dynident_model::{Model, Vec3};
 
-/// Excess of distance, as a share of a pair's size, above which all distances are treated as equal: the search needs no
-/// exact value there, and a bound is computed quickly.
+/// Distance beyond the clearance, as a share of a pair's size, above which all distances are treated as equal. There
+/// the search needs no exact value, and a bound is computed quickly.
 const MAX_RELATIVE_EXCESS: f64 = 0.25;
 
-/// `(clearance - d) / size`, where `d` is the distance between the surfaces of the two links, and at least
+/// Constraint `(clearance - d) / size`, where `d` is the distance between the surfaces of the two links; at least
 /// -[`MAX_RELATIVE_EXCESS`].
 #[derive(Clone, Debug)]
 pub(crate) struct SelfCollisionLimits {
@@ -52,7 +52,7 @@ impl Term for SelfCollisionLimits {
 
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
         let samples = inputs.motion.samples;
-        // Most links are far apart most of the time; their bounding balls show this.
+        // Most links are far apart most of the time; their bounding spheres show this.
         let centre = |solid: &LinkSolid, sample: usize| match solid.body {
             Some(body) => inputs.placements[sample * inputs.bodies + body].point(solid.centre),
             None => solid.centre,

@@ -1,4 +1,4 @@
-//! Self-collision limits as a study states them: shapes on links, given or fitted.
+//! Self-collision limits as a study describes them: shapes on links, given or fitted.
 
 use super::error::LimitError;
 use super::link_points::link_place;
@@ -15,26 +15,27 @@ pub struct SelfCollision {
     pub radius_m: f64,
     /// Minimum distance between surfaces, m.
     pub clearance_m: f64,
-    /// Capsules that replace the fitted ones. Fitted capsules extend from each body's origin to the origins of the
-    /// joints that it carries.
+    /// Capsules that replace fitted ones. A fitted capsule extends from a body's origin to the origin of a joint that
+    /// the body carries.
     pub capsules: Vec<LinkCapsule>,
     /// Other convex shapes, in addition to the capsules.
     pub shapes: Vec<LinkShape>,
     /// Pairs of links that may touch, in addition to adjacent links.
     pub ignored: Vec<[String; 2]>,
-    /// Also omits pairs that touch both in the neutral posture (every joint at zero, or as close as its limits allow)
-    /// and in most of 256 others within the limits, because their shapes overlap. Pairs that are closer than
-    /// `clearance_m` in all of these postures are omitted if they touch in none, otherwise they must not touch. Pairs
-    /// that are closer than twice `clearance_m` in all of them must keep half of their largest distance.
+    /// Whether to omit pairs whose shapes overlap: pairs that touch in the neutral posture (every joint at zero, or
+    /// as close as its limits allow) and in most of 256 random postures within the limits. Pairs that are closer than
+    /// `clearance_m` in all of these postures are omitted if they touch in none of them; otherwise they must not
+    /// touch. Pairs that are closer than twice `clearance_m` in all postures must keep half of their largest
+    /// distance.
     pub leave_out_touching: bool,
-    /// Share of the random postures in which a pair must touch, in addition to the neutral one, to be omitted with
-    /// `leave_out_touching`. Default 0.5; not part of study files.
+    /// Share of the random postures in which a pair must touch, in addition to the neutral posture, to be omitted
+    /// with `leave_out_touching`. Default 0.5; not part of study files.
     #[serde(skip)]
     pub min_overlap_share: f64,
 }
 
 impl Default for SelfCollision {
-    /// Fitted capsules of 0.06 m radius (the tube of a 5 to 15 kg arm), no additional clearance.
+    /// Fitted capsules of 0.06 m radius (the tubes of an arm of 5 to 15 kg), no additional clearance.
     fn default() -> Self {
         Self {
             radius_m: 0.06,
@@ -73,7 +74,7 @@ pub struct LinkShape {
     pub link: String,
     /// Corners, m; at least one.
     pub corners_m: Vec<[f64; 3]>,
-    /// Radius around their hull, m.
+    /// Radius around the hull of the corners, m.
     #[serde(default)]
     pub radius_m: f64,
 }
@@ -133,8 +134,8 @@ impl SelfCollision {
     }
 }
 
-/// Capsules from each body's origin to the origins of the joints it carries; at a tip to the farthest fixed link, or a
-/// sphere. Those of the base start at its frame.
+/// Capsules from each body's origin to the origins of the joints it carries. A body at a tip has a capsule to the
+/// farthest fixed link, or a sphere. The capsules of the base start at the base frame.
 pub(crate) fn fitted_capsules(model: &Model, radius_m: f64) -> Vec<LinkShape> {
     (0..=model.body_count()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
 }

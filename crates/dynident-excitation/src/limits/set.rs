@@ -17,8 +17,8 @@ use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
 use dynident_model::{Model, Transform};
 
-/// Limits prepared for an optimiser. The value of row `r` at sample `s` has index `r * samples + s`; a value `c <= 0`
-/// keeps the limit (see [`Constraint`]).
+/// Limits prepared for an optimiser. The constraint value of row `r` at sample `s` has index `r * samples + s`; the
+/// limit is kept if the value is at most 0 (see [`Constraint`]).
 #[derive(Debug)]
 pub struct LimitSet {
     model: Model,
@@ -31,7 +31,7 @@ pub struct LimitSet {
     placements: bool,
 }
 
-/// Scratch of one thread for one [`LimitSet`]. It stores torques and placements of the last motion, so that
+/// Scratch memory of one thread for one [`LimitSet`]. It stores torques and placements of the last motion, so that
 /// [`apply_adjoint`](LimitSet::apply_adjoint) after [`values`](LimitSet::values) does not compute them again.
 #[derive(Debug)]
 pub struct LimitWorkspace {
@@ -51,9 +51,9 @@ pub struct LimitWorkspace {
 }
 
 impl LimitWorkspace {
-    /// Declares the samples as consecutive times of one motion. Distances to columns of the cell are then also tested
-    /// on the straight path in joint space from one sample to the next, so that an arm cannot pass through a thin
-    /// column between two samples.
+    /// Declares that the samples are consecutive times of one motion. Distances to columns in the workspace are then
+    /// also tested on the straight path in joint space from one sample to the next, so that an arm cannot pass
+    /// through a thin column between two samples.
     pub fn test_between_samples(&mut self) {
         self.is_continuous = true;
     }
@@ -69,7 +69,7 @@ impl LimitSet {
         let joint_motion = JointMotionLimits::new(model, &limits.joints);
         let bands = joint_motion.bands();
         let mut terms: Vec<Box<dyn Term>> = vec![
-            // First, so that the row numbers of the bands are those of the set.
+            // This is the first term, so that the row numbers of its bands are those of the set.
             Box::new(joint_motion),
             Box::new(TorqueLimits::new(model, &limits.joints)),
             Box::new(PowerLimits::new(model, &limits.joints)),
@@ -103,7 +103,7 @@ impl LimitSet {
         })
     }
 
-    /// Constraints of the rows.
+    /// Descriptions of the rows.
     pub fn constraints(&self) -> &[Constraint] {
         &self.constraints
     }
@@ -112,7 +112,7 @@ impl LimitSet {
         &self.bands
     }
 
-    /// Whether places of points are limited: boxes, floor, column, self-collision.
+    /// Whether any limit concerns places of points of the arm: boxes, floor, column, self-collision.
     pub(crate) fn has_places(&self) -> bool {
         self.placements
     }
@@ -122,7 +122,7 @@ impl LimitSet {
         &self.model
     }
 
-    /// Scratch for this set.
+    /// Creates scratch memory for this set.
     pub fn workspace(&self) -> LimitWorkspace {
         LimitWorkspace {
             batch: BatchWorkspace::new(&self.model),
@@ -164,8 +164,8 @@ impl LimitSet {
     }
 
     /// Adds to `adjoint` the derivatives of a cost with respect to the motion, given its derivatives `weights` with
-    /// respect to the [`values`](LimitSet::values). Exact except at the corners of `|x|` at zero and of distances
-    /// between parallel segments, where it is one of the one-sided derivatives.
+    /// respect to the [`values`](LimitSet::values). Exact, except where the constraint is not differentiable: `|x|`
+    /// at zero, and distances between parallel segments. There it is one of the one-sided derivatives.
     ///
     /// # Panics
     /// If sizes differ.

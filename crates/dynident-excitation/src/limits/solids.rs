@@ -1,4 +1,4 @@
-//! Links as solids: distance between the surfaces of two, and the lowest point of one.
+//! Links as solids: distance between the surfaces of two solids, and lowest point of one.
 
 use super::convex::{Placed, hull_distance};
 use super::error::LimitError;
@@ -23,18 +23,18 @@ pub(crate) struct LinkSolid {
     pub shapes: Vec<BodyShape>,
     /// Mean of all corners.
     pub centre: Vec3,
-    /// Radius of a ball around the centre that contains all shapes, m.
+    /// Radius of a sphere around the centre that contains all shapes, m.
     pub reach_m: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidDistance {
-    /// Distance between the surfaces, m; negative if they overlap, then a measure of the depth. Beyond the requested
-    /// distance a lower bound.
+    /// Distance between the surfaces, m; if negative, the shapes overlap, and the magnitude is a measure of the
+    /// depth. A distance above the requested one is a lower bound.
     pub surface_m: f64,
     /// Points of the two links that determine the change of the distance.
     pub points: [Vec3; 2],
-    /// Distance of the surface of each link from its point, m.
+    /// Radius of each link's surface around its point, m.
     pub radii_m: [f64; 2],
     /// Unit vector from the second point to the first.
     pub direction: Vec3,
@@ -42,8 +42,8 @@ pub(crate) struct SolidDistance {
     pub slope: f64,
 }
 
-/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is too
-/// small to balance a contact.
+/// Weight of the distance of the centres for overlapping hulls. It defines the direction out of the overlap, and is
+/// too small to compensate a contact.
 const CENTRE_DISTANCE_WEIGHT: f64 = 0.2;
 
 impl BodyShape {
@@ -104,7 +104,7 @@ impl LinkSolid {
 }
 
 /// Distance between the surfaces of two links. A distance above `beyond` need not be exact. `guesses` contains the
-/// guess of [`hull_distance`] for each pair of shapes.
+/// initial direction of [`hull_distance`] for each pair of shapes.
 pub(crate) fn solid_distance(
     first: &LinkSolid,
     first_at: &Transform,
@@ -150,7 +150,7 @@ pub(crate) fn solid_distance(
                 }
             };
             if found.surface_m > beyond {
-                // A bound, or farther than the nearest known pair.
+                // Only a lower bound is known, or the shapes are farther apart than the nearest known pair.
                 if bound.is_none_or(|bound| found.surface_m < bound.surface_m) {
                     bound = Some(found);
                 }

@@ -101,8 +101,8 @@ impl Surface {
         self.split(below[1], upper, between);
     }
 
-    /// Whether the distance to the other surface is at most `distance_m` (0: they touch). A surface inside a closed one
-    /// is not considered close.
+    /// Whether the distance to the other surface is at most `distance_m` (0: the surfaces touch). A surface
+    /// completely inside a closed surface is not treated as close.
     pub(super) fn is_within(&self, at: &Transform, other: &Self, other_at: &Transform, distance_m: f64) -> bool {
         if self.nodes.is_empty() || other.nodes.is_empty() {
             return false;

@@ -7,8 +7,8 @@ use crate::motion::{Motion, MotionAdjoint};
 use core::fmt::Debug;
 use dynident_model::{Transform, Vec3};
 
-/// Inputs of a limit. Torques are joint-major like the motion; placements (`base_from_body`) are stored sample by
-/// sample, and empty if no limit needs them.
+/// Inputs of a limit. Torques are joint-major like the motion. Placements (`base_from_body`) are stored sample by
+/// sample; they are empty if no limit needs them.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
@@ -30,7 +30,7 @@ impl Inputs<'_> {
 pub(crate) struct Adjoint<'a> {
     pub(crate) motion: &'a mut MotionAdjoint,
     pub(crate) torque: &'a mut TorqueRange,
-    /// Sample by sample, one per body.
+    /// Forces on the bodies, sample by sample, one per body.
     pub(crate) wrenches: &'a mut [Wrench],
 }
 

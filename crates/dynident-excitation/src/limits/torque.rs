@@ -1,4 +1,5 @@
-//! Joint torque by the prior model and the known torque of friction and drives, with a margin for unknown torque.
+//! Limits of joint torque, computed by the prior model and the known torque of friction and drives, with a margin for
+//! unknown torque.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
@@ -7,7 +8,7 @@ use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{Workspace, inverse_dynamics_derivatives};
 use dynident_model::Model;
 
-/// `max(τ_high, -τ_low) / ((1 - margin) limit) - 1`.
+/// Constraint `max(τ_high, -τ_low) / ((1 - margin) limit) - 1`.
 #[derive(Clone, Debug)]
 pub(crate) struct TorqueLimits(Vec<(usize, Constraint)>);
 

@@ -1,9 +1,9 @@
-//! Lowest and highest torque of a motion for a search: known torque with continuous steps that bound the sign
-//! functions.
+//! Lowest and highest torque of a motion, for a search: known torque in which continuous ramps bound the sign
+//! functions of friction.
 //!
-//! A sign function has no useful slope. In the highest torque the step from -1 to 1 is a ramp that ends at zero
-//! velocity; in the lowest torque the ramp begins there. Both bound the sign function, and differ from it only at
-//! velocities below the width of the ramp.
+//! A sign function has no useful slope. In the highest torque, the change from -1 to 1 is a ramp that ends at zero
+//! velocity; in the lowest torque, the ramp begins at zero velocity. Both ramps bound the sign function, and differ
+//! from it only at velocities below the width of the ramp.
 
 use super::known_torque::KnownTorque;
 use crate::motion::{Motion, MotionAdjoint};
@@ -45,14 +45,14 @@ struct SmoothTerm {
     term: TorqueTerm,
     value: f64,
     joints: Vec<usize>,
-    /// Step of friction that depends on the sign of a velocity.
+    /// Sign function of friction that depends on the direction of a velocity.
     step: Option<Step>,
 }
 
 #[derive(Clone, Debug)]
 struct Step {
     ratios: [f64; 2],
-    /// Value at positive and at negative velocity.
+    /// Friction torque at positive and at negative velocity.
     ends: [f64; 2],
     by_load: bool,
     fading: Option<[f64; 2]>,
@@ -135,9 +135,10 @@ impl SmoothTorque {
         }
     }
 
-    /// Adds the derivatives of a cost, given its derivatives `by_range` with respect to both ends of the range: with
-    /// respect to the motion to `adjoint`, and with respect to the rigid-body torque to `by_torque`, except for the
-    /// direct share, which is the sum of both ends.
+    /// Adds the derivatives of a cost, given its derivatives `by_range` with respect to both ends of the torque
+    /// range. Derivatives with respect to the motion are added to `adjoint`, those with respect to the rigid-body
+    /// torque to `by_torque`. The direct effect of the rigid-body torque on both ends (the sum of both derivatives)
+    /// is not added.
     pub(crate) fn apply_adjoint(
         &self,
         motion: &Motion,
@@ -205,7 +206,8 @@ impl Step {
         [ramp(0.0), ramp(-self.width)]
     }
 
-    /// Factor of the step in the torque of the joint at `place`, and its derivative with respect to the velocity.
+    /// Factor of the sign function in the torque of the joint at `place`, and its derivative with respect to the
+    /// velocity.
     fn size(&self, place: usize, value: f64, velocity: f64, rigid: f64) -> (f64, f64) {
         let size = value * self.ratios[place] * if self.by_load { rigid.abs() } else { 1.0 };
         let Some([speed, exponent]) = self.fading else { return (size, 0.0) };

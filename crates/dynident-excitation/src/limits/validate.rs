@@ -79,7 +79,7 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
     let name = &limit.joint;
     if let Some(position) = limit.position {
         range(&format!("position of joint `{name}`"), position)?;
-        // The half width is a divisor, and the ends must differ by more than rounding.
+        // The half width is a divisor, so the ends must differ by more than rounding.
         let (middle, half) = middle_and_half(position);
         if half <= 1e-12 * middle.abs().max(1.0) {
             return Err(LimitError::ZeroRange { joint: name.clone(), position: position[0] });

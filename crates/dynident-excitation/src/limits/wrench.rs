@@ -1,9 +1,9 @@
-//! Derivatives with respect to places in space, mapped to joint positions.
+//! Derivatives with respect to positions in space, converted to derivatives with respect to joint positions.
 
 use dynident_model::{Model, Transform, Vec3};
 
-/// Force and moment about the base origin in the base frame: the derivative of a cost with respect to the place of a
-/// body's point is a force at that point.
+/// Force and moment about the base origin in the base frame. The derivative of a cost with respect to the position of
+/// a body's point acts like a force at that point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wrench {
     force: Vec3,
@@ -19,9 +19,9 @@ impl Wrench {
     }
 }
 
-/// Adds `Jᵀ f` of one sample to `by_position[joint]`. For a wrench on the bodies that a joint carries, a revolute joint
-/// about axis `a` through `o` gets `a · (n - o × f)`, a prismatic one `a · f`; followers pass their share to the joints
-/// that they follow. One inward sweep, which consumes the wrenches.
+/// Adds `Jᵀ f` of one sample to `by_position[joint]`. With the total wrench on the bodies that a joint carries, a
+/// revolute joint about axis `a` through `o` receives `a · (n - o × f)`, a prismatic joint `a · f`. Followers pass
+/// their share to the joints that they follow. One inward sweep, which overwrites the wrenches.
 pub(crate) fn apply_wrenches(
     model: &Model,
     placements: &[Transform],

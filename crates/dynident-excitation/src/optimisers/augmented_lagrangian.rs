@@ -1,4 +1,4 @@
-//! Minimisation under smooth constraints with exact gradients: augmented Lagrangian over a projected L-BFGS.
+//! Minimisation under smooth constraints with exact gradients: augmented Lagrangian method with projected L-BFGS.
 
 use super::constrained_problem::{
     AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, AugmentedLagrangianStatus,
@@ -7,13 +7,13 @@ use super::constrained_problem::{
 use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
 use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length};
 
-/// Minimises a [`ConstrainedProblem`] from `state`: a point, which is first clamped to the bounds, or the end of an
-/// earlier search.
+/// Minimises a [`ConstrainedProblem`] from `state`. The state is a point, which is first clamped to the bounds, or
+/// the end of an earlier search.
 ///
-/// The function of Powell, Hestenes and Rockafellar, L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ,
-/// is minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for inequalities), and
-/// ρ grows if the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014,
-/// algorithm 4.1). Finds a local solution.
+/// The function of Powell, Hestenes and Rockafellar, L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] /
+/// 2ρ with multipliers λ and penalty ρ, is minimised inside the bounds by L-BFGS with projected steps. Then λ becomes
+/// λ + ρ c (at least 0 for inequalities), and ρ grows if the violation was not halved (Birgin and Martínez,
+/// *Practical Augmented Lagrangian Methods*, 2014, algorithm 4.1). Finds a local solution.
 ///
 /// Deterministic. `watch` is called with the best point so far after every evaluation.
 ///
@@ -31,7 +31,7 @@ pub(crate) fn augmented_lagrangian(
     let mut x: Vec<f64> = state.x.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
     let mut search = Search::new(problem, settings, watch);
     search.begin(state, &x)?;
-    // A continued search starts near its end.
+    // A continued search begins close to its solution.
     let tolerance = if state.multipliers.is_empty() { 0.1 } else { 1e-4 };
     let status = search.descend(&bounds, &mut x, tolerance);
     Ok(search.result(x, status))
@@ -113,8 +113,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         Ok(())
     }
 
-    /// Runs descents of the augmented Lagrangian with multiplier updates between them, and moves `x` to the end of the
-    /// last. `tolerance` is that of the first descent.
+    /// Runs descents of the augmented Lagrangian with multiplier updates between them, and moves `x` to the end of
+    /// the last descent. `tolerance` is the tolerance of the first descent.
     fn descend(&mut self, bounds: &[[f64; 2]], x: &mut [f64], mut tolerance: f64) -> AugmentedLagrangianStatus {
         let settings = self.settings;
         let mut last_measure = f64::INFINITY;
@@ -157,7 +157,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         }
         self.objective = self.problem.values(&x, &mut self.c);
         let end_violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
-        // Only violated constraints: the multipliers of an unconverged search can be wrong for slack ones.
+        // Only violated constraints are included, because the multipliers of inactive constraints can be wrong before
+        // convergence.
         let pushing =
             self.multipliers.iter().zip(&self.c).map(|(multiplier, c)| (multiplier * c).max(0.0)).sum::<f64>();
         let feasible = self.best_violation <= self.settings.feasibility_tolerance;
@@ -182,8 +183,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         if i < self.equalities { self.c[i].abs() } else { self.c[i].max(0.0) }
     }
 
-    /// Writes the gradient weights of the constraints at the current c. Returns their part of the augmented Lagrangian,
-    /// which is not finite if a constraint is not, and the largest violation.
+    /// Writes the gradient weights of the constraints at the current c. Returns the constraints' part of the
+    /// augmented Lagrangian (not finite if a constraint is not finite) and the largest violation.
     fn push(&mut self) -> (f64, f64) {
         let (equal, above) = self.c.split_at(self.equalities);
         let (of_equal, of_above) = self.multipliers.split_at(self.equalities);
@@ -195,7 +196,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         (squares / (2.0 * self.penalty), worst)
     }
 
-    /// Stores the point if it is better: feasible before infeasible, then by value or violation.
+    /// Stores the point if it is better: feasible points before infeasible ones, then by value or violation.
     fn record(&mut self, x: &[f64], violation: f64) {
         let tolerance = self.settings.feasibility_tolerance;
         let better = if violation <= tolerance {
@@ -210,7 +211,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         }
     }
 
-    /// First-order update at the current c. Returns the violation of feasibility and complementarity.
+    /// First-order update of the multipliers at the current c. Returns the violation of feasibility and
+    /// complementarity.
     fn update_multipliers(&mut self) -> f64 {
         let mut measure: f64 = 0.0;
         for i in 0..self.c.len() {
@@ -227,7 +229,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
     }
 }
 
-/// Sums over thousands of constraints, with one partial sum per lane.
+/// Sums over thousands of constraints, with one partial sum per SIMD lane.
 #[derive(Default)]
 struct PushSums {
     /// `w² - λ²`.
@@ -270,7 +272,7 @@ impl PushSums {
         }
     }
 
-    /// Sum of squares, not finite if a constraint is not, and the largest violation.
+    /// Sum of squares (not finite if a constraint is not finite) and largest violation.
     fn of_all_lanes(&self) -> (f64, f64) {
         let squares: f64 = self.squares.iter().zip(&self.undefined).map(|(a, b)| a + b).sum();
         (squares, self.worst.iter().copied().fold(0.0, f64::max))
@@ -300,7 +302,7 @@ impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
 
     fn gradient(&mut self, gradient: &mut [f64]) {
         self.problem.gradient(&self.weights, gradient);
-        // The curvature belongs to the point of the gradient, and a rejected trial may follow.
+        // The curvature is that at the point of the gradient, and a rejected trial may follow.
         self.curvature.clear();
         let (equal, above) = self.weights.split_at(self.equalities);
         self.curvature.resize(equal.len(), self.penalty);

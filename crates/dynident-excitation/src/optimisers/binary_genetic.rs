@@ -1,16 +1,17 @@
-//! The paper's genetic algorithm: binary coding, roulette wheel selection by 1/H, one-point crossover, bit mutation.
+//! Genetic algorithm of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* ("the
+//! paper" below): binary coding, roulette wheel selection by 1/H, one-point crossover, bit mutation.
 
 use super::{Objective, OptimiserError, Progress, Watch, check_bounds, evaluate_all, setting};
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`binary_genetic()`]; the defaults are the paper's (*Iterative Identification of Robot Dynamic
-/// Parameters Based on Logistic Function*, section 2.2).
+/// Settings of [`binary_genetic()`]. The defaults are those of *Iterative Identification of Robot Dynamic Parameters
+/// Based on Logistic Function*, section 2.2.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct BinaryGeneticSettings {
-    /// Bits per variable, 1 to 52. Default 20.
+    /// Number of bits per variable, 1 to 52. Default 20.
     pub bits: usize,
     /// Number of individuals, even and at least 2. Default 40.
     pub population: usize,
@@ -18,10 +19,11 @@ pub struct BinaryGeneticSettings {
     pub generations: usize,
     /// Crossover probability of a pair of parents. Default 0.5.
     pub crossover: f64,
-    /// Flip probability of every bit in every generation. The paper does not state whether its 0.01 is per bit or per
-    /// individual; here it is per bit. Default 0.01.
+    /// Probability with which every bit flips in every generation. The paper does not state whether its 0.01 is per
+    /// bit or per individual; here it is per bit. Default 0.01.
     pub mutation: f64,
-    /// Whether the best individual of a generation is copied to the next. The paper mentions no elite. Default false.
+    /// Whether the best individual of a generation is copied to the next (elitism). The paper does not mention
+    /// elitism. Default false.
     pub elite: bool,
     /// Seed of the random numbers. Default 0.
     pub seed: u64,
@@ -49,7 +51,7 @@ impl BinaryGeneticSettings {
     }
 }
 
-/// One generation of the search: a point of the paper's Fig. 7.
+/// Objective values of one generation of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Generation {
     /// Lowest objective in this generation.
@@ -65,7 +67,7 @@ pub struct Generation {
 pub struct BinaryGeneticResult {
     /// Best point of all generations.
     pub best: Vec<f64>,
-    /// Its objective; infinite if no individual had a finite one.
+    /// Objective of the best point; infinite if no individual had a finite objective.
     pub value: f64,
     /// One entry per generation, in order.
     pub history: Vec<Generation>,
@@ -75,16 +77,16 @@ pub struct BinaryGeneticResult {
     pub stopped: bool,
 }
 
-/// Minimises a positive `objective` over the box `bounds` by the paper's genetic algorithm.
+/// Minimises a positive `objective` H over the box `bounds` by the binary genetic algorithm.
 ///
-/// A variable is a binary number of `bits` bits, most significant first, `x = lower + (upper - lower) k / (2^bits -
-/// 1)`; an individual is the sequence of the bits of its variables. In every generation parents are drawn by roulette
-/// wheel, with probability proportional to 1/H; consecutive parents are crossed at one random place with probability
-/// `crossover`; every bit of the children flips with probability `mutation`; the children replace all parents (except
-/// the elite, if enabled).
+/// A variable is a binary number k of `bits` bits, most significant first, `x = lower + (upper - lower) k / (2^bits -
+/// 1)`. An individual is the sequence of the bits of its variables. In every generation parents are drawn by roulette
+/// wheel, with probability proportional to 1/H. Consecutive parents are crossed at one random place with probability
+/// `crossover`, and every bit of the children flips with probability `mutation`. The children replace all parents
+/// (except the best one with `elite`).
 ///
-/// Candidates are evaluated in parallel; the result depends only on the seed. A candidate with an infinite or undefined
-/// objective is never drawn unless all are.
+/// Candidates are evaluated in parallel; the result depends only on the seed. A candidate whose objective is infinite
+/// or undefined is drawn only if all candidates are like this.
 ///
 /// # Errors
 /// A setting out of range, or a range that is empty or infinite.
@@ -152,7 +154,7 @@ fn decode(individual: &[bool], bounds: &[[f64; 2]], bits: usize) -> Vec<f64> {
         .zip(bounds)
         .map(|(digits, &[lower, upper])| {
             let number = digits.iter().fold(0_u64, |number, &digit| 2 * number + u64::from(digit));
-            // Exactly the end of the range at the largest number.
+            // Gives exactly the end of the range for the largest number.
             (lower + (upper - lower) * (number as f64 / largest)).min(upper)
         })
         .collect()
@@ -174,7 +176,7 @@ fn children(
         })
         .collect();
     if !(cumulated > 0.0 && cumulated.is_finite()) {
-        // All individuals get the same probability if none is fit or an objective is not positive.
+        // All individuals get the same probability if all objectives are infinite or one is not positive.
         wheel = (1..=values.len()).map(|count| count as f64).collect();
     }
     let total = wheel[wheel.len() - 1];

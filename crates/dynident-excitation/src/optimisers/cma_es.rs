@@ -13,19 +13,19 @@ use std::collections::VecDeque;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
-    /// Candidates of a generation, at least 4; `None`: 4 + ⌊3 ln n⌋. Default `None`.
+    /// Number of candidates of a generation, at least 4; `None`: 4 + ⌊3 ln n⌋ for n variables. Default `None`.
     pub population: Option<usize>,
-    /// Restarts after the end of a run, each from a random place with twice the candidates (IPOP, Auger and Hansen
-    /// 2005). Default 0.
+    /// Number of restarts after the end of a run, each from a random point with twice the candidates (IPOP, Auger and
+    /// Hansen 2005). Default 0.
     pub restarts: usize,
-    /// Number of evaluations of all runs after which no generation begins. Default 100,000.
+    /// Number of evaluations of all runs; after it no generation begins. Default 100,000.
     pub max_evaluations: usize,
-    /// Objective at which the search ends. Default none.
+    /// Objective value at which the search ends. Default none.
     pub target: Option<f64>,
-    /// Minimum difference between the best values of the last 10 + ⌈30 n/λ⌉ generations and all values of the present
-    /// one; below it a run ends. Default 1e-12.
+    /// A run ends if the best values of the last 10 + ⌈30 n/λ⌉ generations and all values of the current generation
+    /// differ by less than this. n is the number of variables, λ that of candidates. Default 1e-12.
     pub function_tolerance: f64,
-    /// Minimum step size as a share of the first one; below it a run ends. Default 1e-12.
+    /// A run ends if the step size falls below this share of the first step size. Default 1e-12.
     pub step_tolerance: f64,
     /// Seed of the random numbers. Default 0.
     pub seed: u64,
@@ -72,7 +72,7 @@ pub enum CmaEsStatus {
     TargetReached,
     /// The objective no longer changes.
     FunctionTolerance,
-    /// The steps are below the tolerance, or too small to change the mean in double precision.
+    /// The steps are below the tolerance, or too small to change the mean of the candidates in double precision.
     StepTolerance,
     /// The condition number of the covariance exceeds 1e14.
     IllConditioned,
@@ -87,13 +87,13 @@ pub enum CmaEsStatus {
 /// One run of the strategy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CmaEsRun {
-    /// Candidates of a generation.
+    /// Number of candidates of a generation.
     pub population: usize,
     /// Number of evaluations in this run.
     pub evaluations: usize,
     /// Lowest objective of this run.
     pub value: f64,
-    /// Reason for its end.
+    /// Reason for the end of this run.
     pub status: CmaEsStatus,
 }
 
@@ -102,7 +102,7 @@ pub struct CmaEsRun {
 pub struct CmaEsResult {
     /// Best point of all runs, inside the bounds.
     pub best: Vec<f64>,
-    /// Its objective; infinite if it was never finite.
+    /// Objective of the best point; infinite if the objective was never finite.
     pub value: f64,
     /// Number of evaluations of all runs.
     pub evaluations: usize,
@@ -115,8 +115,9 @@ pub struct CmaEsResult {
 /// Minimises `objective` from `start` with initial standard deviations `steps` (one per variable), inside `bounds`.
 ///
 /// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A
-/// candidate outside the bounds is evaluated at the nearest point inside, and ranked with a penalty: the square of its
-/// distance (in the scale of the search) times the spread of the generation's values (Hansen 2016, appendix B.5).
+/// candidate outside the bounds is evaluated at the nearest point inside, and ranked with a penalty. The penalty is
+/// the square of its distance (in the scale of the search) times the spread of the generation's values (Hansen 2016,
+/// appendix B.5).
 ///
 /// Candidates are evaluated in parallel; the result depends only on the seed.
 ///
@@ -249,7 +250,7 @@ impl Search<'_> {
         CmaEsRun { population: strategy.population, evaluations, value: lowest_of_run, status }
     }
 
-    /// Random start of the next run: anywhere inside finite bounds, else around the first start.
+    /// Random start of the next run: anywhere inside finite bounds, otherwise around the first start.
     fn random_place(&mut self, start: &[f64], steps: &[f64]) -> Vec<f64> {
         (0..start.len())
             .map(|i| {
@@ -274,7 +275,7 @@ struct Strategy {
     mean: DVector<f64>,
     sigma: f64,
     covariance: DMatrix<f64>,
-    /// Eigenvectors of the covariance, and the square roots of its eigenvalues below.
+    /// Eigenvectors of the covariance; the field below contains the square roots of its eigenvalues.
     axes: DMatrix<f64>,
     lengths: DVector<f64>,
     path_sigma: DVector<f64>,
@@ -368,7 +369,7 @@ impl Strategy {
         self.path_sigma.axpy((c_sigma * (2.0 - c_sigma) * mu_eff).sqrt(), &whitened, 1.0);
         let length = self.path_sigma.norm();
         let settled = (1.0 - (1.0 - c_sigma).powi(2 * self.generation as i32)).sqrt();
-        // The path is not updated while the step size catches up.
+        // The path is not updated while the step size is still adapting.
         let steady = length / settled < (1.4 + 2.0 / (n + 1.0)) * expected_length;
         self.path_c *= 1.0 - c_c;
         if steady {
@@ -420,7 +421,7 @@ impl Strategy {
         }
         let oldest = self.recent.iter().copied().fold(f64::INFINITY, f64::min);
         let newest = self.recent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Equal infinite values are flat too, although their difference is NaN.
+        // Equal infinite values also mean that the objective no longer changes, although their difference is NaN.
         let flat = |low: f64, high: f64| low == high || high - low <= settings.function_tolerance;
         (self.recent.len() == window && flat(oldest, newest) && flat(lowest, highest))
             .then_some(CmaEsStatus::FunctionTolerance)

@@ -1,13 +1,13 @@
-//! Constrained problem, settings, state and result of the augmented Lagrangian.
+//! Constrained problem of the augmented Lagrangian method, with settings, state and result.
 
 use super::{OptimiserError, Step, setting};
 
-/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints,
+/// Minimises f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints,
 /// c_i(x) <= 0 for the others, and lower <= x <= upper.
 ///
-/// The evaluation has two parts, so that one adjoint sweep computes the gradient of f and of any number of constraints
-/// together, reusing the intermediate values. Constraints should be scaled to order one (limit reached = 0, limit
-/// exceeded by its own size = 1).
+/// The evaluation has two parts, so that one adjoint sweep computes the gradient of f and of any number of
+/// constraints together from stored intermediate values. Constraints should be scaled to order one (0 at the limit, 1
+/// if the limit is exceeded by its own size).
 pub(crate) trait ConstrainedProblem {
     fn variables(&self) -> usize;
     /// Lower and upper bound of each variable; infinite without bound.
@@ -16,41 +16,42 @@ pub(crate) trait ConstrainedProblem {
     fn equalities(&self) -> usize {
         0
     }
-    /// Writes c(x) and returns f(x) at an `x` inside the bounds. Values that are not finite are undefined; the search
-    /// then takes a shorter step.
+    /// Writes c(x) and returns f(x) at an `x` inside the bounds. If a value is not finite, the function is undefined
+    /// there, and the search takes a shorter step.
     fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
     /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most
     /// weights are zero.
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
-    /// Scale of gradients at an objective f: max(1, |f|), for an objective with a meaningful zero.
+    /// Scale of gradients at the objective value f: max(1, |f|), for an objective with a meaningful zero.
     fn objective_scale(&self, objective: f64) -> f64 {
         objective.abs().max(1.0)
     }
-    /// Optional: prepares a positive definite model of the curvature of the augmented Lagrangian at the `x` of the last
-    /// [`gradient`](ConstrainedProblem::gradient), which initialises the quasi-Newton matrix at every step. Returns
-    /// whether there is a model.
+    /// Optional: prepares a positive definite model of the curvature of the augmented Lagrangian at the `x` of the
+    /// last [`gradient`](ConstrainedProblem::gradient). The model initialises the quasi-Newton matrix at every step.
+    /// Returns whether there is a model.
     fn prepare_metric(&mut self, _known: &CurvatureFacts<'_>) -> bool {
         false
     }
-    /// Multiplies by the inverse of the model of the last [`prepare_metric`](ConstrainedProblem::prepare_metric).
+    /// Multiplies a vector by the inverse of the model of the last
+    /// [`prepare_metric`](ConstrainedProblem::prepare_metric).
     fn divide_by_metric(&self, _vector: &mut [f64]) {}
 }
 
 /// Data about the augmented Lagrangian at a point, for a model of its curvature.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CurvatureFacts<'a> {
-    /// Penalty of each active constraint; 0 for inactive ones.
+    /// Penalty of each active constraint; 0 for inactive constraints.
     pub pushing: &'a [f64],
     pub gradient: &'a [f64],
     /// Variables that are not at a bound; a model must not couple them with the others.
     pub free: &'a [bool],
-    /// The last step, if it is in memory.
+    /// The last step, if L-BFGS still stores it.
     pub last: Option<Step<'a>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AugmentedLagrangianSettings {
-    /// Maximum violation of a feasible point. Default 1e-8.
+    /// Maximum violation at which a point is feasible. Default 1e-8.
     pub feasibility_tolerance: f64,
     /// Convergence tolerance of the largest entry of the projected gradient of the Lagrangian, times
     /// [`objective_scale`](ConstrainedProblem::objective_scale). Default 1e-6.
@@ -61,13 +62,14 @@ pub(crate) struct AugmentedLagrangianSettings {
     pub max_outer_iterations: usize,
     /// Maximum number of descent steps between two multiplier updates. Default 200.
     pub max_inner_iterations: usize,
-    /// Memory of L-BFGS. Default 12.
+    /// Number of steps that L-BFGS stores. Default 12.
     pub memory: usize,
-    /// Initial penalty; `None`: from the sizes of f and c at the start, between 1e-6 and 10. Default `None`.
+    /// Initial penalty. With `None` it follows from the sizes of f and c at the start, between 1e-6 and 10. Default
+    /// `None`.
     pub initial_penalty: Option<f64>,
-    /// Factor of the penalty if an update did not halve the violation. Default 10.
+    /// Factor by which the penalty grows if an update did not halve the violation. Default 10.
     pub penalty_growth: f64,
-    /// Penalty above which the problem is declared infeasible. Default 1e12.
+    /// Penalty above which the problem is reported as infeasible. Default 1e12.
     pub max_penalty: f64,
 }
 
@@ -110,14 +112,14 @@ impl AugmentedLagrangianSettings {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct AugmentedLagrangianState {
     pub x: Vec<f64>,
-    /// Multipliers of the constraints: decrease of the objective per unit of relaxation. Empty for zeros.
+    /// Multipliers of the constraints: decrease of the objective per unit of relaxation. Empty means zeros.
     pub multipliers: Vec<f64>,
-    /// Penalty; `None` for that of the settings.
+    /// Penalty; `None` selects the penalty of the settings.
     pub penalty: Option<f64>,
 }
 
 impl From<Vec<f64>> for AugmentedLagrangianState {
-    /// A point without multipliers.
+    /// State at a point without multipliers.
     fn from(x: Vec<f64>) -> Self {
         Self { x, ..Self::default() }
     }
@@ -125,12 +127,13 @@ impl From<Vec<f64>> for AugmentedLagrangianState {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AugmentedLagrangianStatus {
-    /// Feasible and stationary within the tolerances.
+    /// The point is feasible and stationary within the tolerances.
     Converged,
-    /// Feasible, and no lower value exists in double precision, although the gradient exceeds its tolerance.
+    /// The point is feasible and no lower value exists in double precision, although the gradient exceeds its
+    /// tolerance.
     PrecisionLimit,
     IterationLimit,
-    /// The maximum penalty is reached and constraints are still violated: no feasible point nearby.
+    /// The maximum penalty is reached and constraints are still violated: there is no feasible point nearby.
     Infeasible,
     Stopped,
 }
@@ -147,11 +150,11 @@ pub(crate) struct AugmentedLagrangianResult {
     pub violation: f64,
     /// Whether the violation is within the tolerance.
     pub feasible: bool,
-    /// The last iterate with its multipliers and penalty. While constraints are violated it is a better start than
-    /// [`best`](Self::best), which can be an early point that kept them by resting.
+    /// The last iterate with its multipliers and penalty. While constraints are violated, it is a better start than
+    /// [`best`](Self::best), which can be an early point that kept them only because the motion was almost at rest.
     pub end: AugmentedLagrangianState,
-    /// `f + Σ λ_i c_i` at the last iterate over the violated constraints: to first order the objective after they are
-    /// satisfied.
+    /// `f + Σ λ_i c_i` over the violated constraints at the last iterate: to first order, the objective after the
+    /// constraints are satisfied.
     pub lagrangian: f64,
     /// Largest violation at the last iterate.
     pub end_violation: f64,

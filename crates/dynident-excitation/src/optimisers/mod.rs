@@ -1,8 +1,8 @@
-//! **Optimisers**, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]), and with exact gradients
-//! from many starts (augmented Lagrangian, projected L-BFGS), which [`design()`](crate::design()) uses.
+//! **Optimisers**, one file each. Without derivatives: [`binary_genetic()`] and [`cma_es()`]. With exact gradients
+//! from many starts: augmented Lagrangian with projected L-BFGS, which [`design()`](crate::design()) uses.
 //!
-//! All are deterministic for a given seed or start, on any number of threads, and can be stopped at any time: a
-//! callback gets the best point so far.
+//! All are deterministic for a given seed or start, on any number of threads. A callback receives the best point so
+//! far and can stop the search at any time.
 
 mod augmented_lagrangian;
 mod binary_genetic;
@@ -29,9 +29,9 @@ use rayon::prelude::*;
 /// State of a search, passed to its callback.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// Best point so far: the feasible one of the lowest objective, or the least infeasible one.
+    /// Best point so far: the feasible point with the lowest objective, or the point with the smallest violation.
     pub best: &'a [f64],
-    /// Its objective.
+    /// Objective of the best point.
     pub value: f64,
     /// Largest violation of a constraint; zero for optimisers with bounds only.
     pub violation: f64,

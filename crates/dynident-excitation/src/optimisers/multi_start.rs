@@ -1,4 +1,4 @@
-//! Parallel starts of the augmented Lagrangian, with the best result.
+//! Runs the augmented Lagrangian method from several starts in parallel, and selects the best result.
 
 use super::{
     AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct MultiStartResult {
-    /// Index of the best start: lowest objective among the feasible ones, else smallest violation.
+    /// Index of the best start: lowest objective among the feasible ones, otherwise smallest violation.
     pub best_start: usize,
     /// Results of all starts, in order; an error if the problem is undefined at the start.
     pub runs: Vec<Result<AugmentedLagrangianResult, OptimiserError>>,
@@ -29,10 +29,10 @@ impl MultiStartResult {
 
 /// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
 ///
-/// `watch` is called after every evaluation with the best point of all starts, and can stop the search; `iteration` and
-/// `evaluations` are those of the calling start. Unless stopped, the result does not depend on the number of threads:
-/// among equal results the first start is best. Starts that have not begun when the search is stopped are treated as
-/// undefined.
+/// `watch` is called after every evaluation with the best point of all starts, and can stop the search. `iteration`
+/// and `evaluations` are those of the start that calls it. Unless the search is stopped, the result does not depend
+/// on the number of threads; among equal results the first start is best. Starts that have not begun when the search
+/// is stopped are treated as undefined.
 ///
 /// # Errors
 /// No start; settings or bounds out of range.
@@ -81,7 +81,8 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     Ok(MultiStartResult { best_start, runs })
 }
 
-/// Whether a point (value, violation) is better than another: feasible before infeasible, then by value or violation.
+/// Whether a point (value, violation) is better than another: feasible points before infeasible ones, then by value
+/// or violation.
 fn before(one: (f64, f64), other: (f64, f64), tolerance: f64) -> bool {
     match (one.1 <= tolerance, other.1 <= tolerance) {
         (true, true) => one.0 < other.0,

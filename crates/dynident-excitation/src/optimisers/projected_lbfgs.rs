@@ -1,5 +1,5 @@
-//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, with steps projected onto
-//! the box.
+//! Minimisation of a smooth function inside a box by limited-memory BFGS on the free variables, with steps projected
+//! onto the box.
 
 use std::collections::VecDeque;
 
@@ -9,12 +9,12 @@ pub(crate) trait Smooth {
     /// Value at `x`; not finite where the function is undefined.
     fn value(&mut self, x: &[f64]) -> f64;
     fn gradient(&mut self, gradient: &mut [f64]);
-    /// Prepares a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and
-    /// the last step with its change of the gradient; false without a model.
+    /// Prepares a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient
+    /// and the last step with its change of the gradient. Returns false if there is no model.
     fn prepare_metric(&mut self, _gradient: &[f64], _free: &[bool], _last: Option<Step<'_>>) -> bool {
         false
     }
-    /// Multiplies by the inverse of that model.
+    /// Multiplies a vector by the inverse of the prepared model.
     fn divide_by_metric(&self, _vector: &mut [f64]) {}
     fn halted(&self) -> bool;
 }
@@ -49,7 +49,7 @@ struct Pair {
     y: Vec<f64>,
 }
 
-/// Armijo's share of the predicted decrease and Wolfe's share of the slope (Nocedal and Wright, *Numerical
+/// Armijo's share of the predicted decrease, and Wolfe's share of the slope (Nocedal and Wright, *Numerical
 /// Optimization*, 2006, section 3.1).
 const MIN_DECREASE_SHARE: f64 = 1e-4;
 const MAX_SLOPE_SHARE: f64 = 0.9;
@@ -58,9 +58,9 @@ const MAX_TRIALS: usize = 40;
 /// Minimises from `x`, which must be inside the box, and moves it to the lowest point found. Returns the reason for the
 /// end and the largest entry of the projected gradient `P(x - g) - x`.
 ///
-/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that the gradient does not hold at a
-/// bound (two-metric projection, Bertsekas 1982); line search for the weak Wolfe conditions by bisection and doubling
-/// (Lewis and Overton 2013) along the projected path.
+/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that the gradient does not press
+/// against a bound (two-metric projection, Bertsekas 1982). The line search satisfies the weak Wolfe conditions by
+/// bisection and doubling (Lewis and Overton 2013) along the projected path.
 pub(crate) fn projected_lbfgs(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -93,7 +93,7 @@ pub(crate) fn projected_lbfgs(
         let mut direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         let steep = dot(&direction, &at.gradient) < -1e-10 * norm(&direction) * norm(&at.gradient);
         if !pairs.is_empty() && !steep {
-            // The memory is reset if its direction does not descend or is not finite.
+            // The stored steps are deleted if the direction is not a descent direction or not finite.
             pairs.clear();
             direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         }
@@ -131,8 +131,8 @@ struct Point {
     gradient: Vec<f64>,
 }
 
-/// Searches along `P(from + step·direction)` for a point with sufficient decrease and a flatter slope. Returns the last
-/// point with sufficient decrease.
+/// Searches along `P(from + step·direction)` for a point with sufficient decrease and a small enough slope. Returns
+/// the last point with sufficient decrease.
 fn line_search(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -184,12 +184,12 @@ fn line_search(
 /// Multiplies a vector by the initial matrix of the recursion.
 type Shape<'a> = dyn Fn(&mut [f64]) + 'a;
 
-/// `-H g` on the free variables by the two-loop recursion, zero on the others; the initial matrix is `shape` or a
-/// multiple of the identity.
+/// `-H g` on the free variables by the two-loop recursion, zero on the other variables. The initial matrix is `shape`
+/// or a multiple of the identity.
 fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool], shape: Option<&Shape<'_>>) -> Vec<f64> {
     let masked = |v: &[f64], w: &[f64]| -> f64 { (0..v.len()).filter(|&i| free[i]).map(|i| v[i] * w[i]).sum() };
     let mut direction: Vec<f64> = gradient.iter().zip(free).map(|(&g, &free)| if free { -g } else { 0.0 }).collect();
-    // Pairs without curvature in the free variables are not used.
+    // Steps without positive curvature in the free variables are not used.
     let useful: Vec<(&Pair, f64)> = pairs
         .iter()
         .map(|pair| (pair, masked(&pair.s, &pair.y)))
@@ -224,7 +224,7 @@ fn add(to: &mut [f64], factor: f64, v: &[f64], free: &[bool]) {
     }
 }
 
-/// Largest step, at most one, that moves no variable by more than one unit or a tenth of its range.
+/// Largest step, at most one, with which no variable moves by more than one unit or a tenth of its range.
 fn cautious_step(direction: &[f64], bounds: &[[f64; 2]]) -> f64 {
     direction.iter().zip(bounds).fold(1.0, |step: f64, (d, &[lower, upper])| {
         let reach = (0.1 * (upper - lower)).min(1.0);
@@ -232,7 +232,7 @@ fn cautious_step(direction: &[f64], bounds: &[[f64; 2]]) -> f64 {
     })
 }
 
-/// Largest entry of `P(x - g) - x`: zero if no step inside the box descends.
+/// Largest entry of `P(x - g) - x`: zero if no step inside the box decreases the function.
 fn projected_gradient(x: &[f64], gradient: &[f64], bounds: &[[f64; 2]]) -> f64 {
     (0..x.len())
         .fold(0.0, |largest: f64, i| largest.max(((x[i] - gradient[i]).clamp(bounds[i][0], bounds[i][1]) - x[i]).abs()))

@@ -1,10 +1,12 @@
-//! **Step-wise design**: each joint makes a logistic stroke while the others rest.
+//! **Step-wise design**: each joint makes a logistic stroke (smooth move from one position to another) while the
+//! others rest.
 //!
-//! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 9, 10 and 17 to 19, for
-//! any arm. A revolute joint that moves alone excites three parameters of the bodies that it carries: the inertia about
-//! its axis and the two first moments normal to it, with the row `[q̈, g cos q, -g sin q]`, where g is the gravity
-//! component normal to the axis. The zero position only rotates the last two columns, which does not change the
-//! condition number. So H = Σ cond over the joints, and the joints can be optimised separately.
+//! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 9, 10 and 17 to 19,
+//! for any arm. A revolute joint that moves alone excites three parameters of the bodies that it carries: the inertia
+//! about its axis and the two first moments normal to it. The regressor row is `[q̈, g cos q, -g sin q]`, where g is
+//! the gravity component normal to the axis. The zero position only rotates the last two columns, which does not
+//! change the condition number. The objective of equation 19 is therefore H = Σ cond, the sum of the joints'
+//! condition numbers, and the joints can be optimised separately.
 
 mod singular_values;
 mod smooth;
@@ -72,16 +74,17 @@ pub fn gravity_across(model: &Model, joint: usize, rest: &[f64]) -> Result<f64, 
     }
 }
 
-/// Stroke of one joint.
+/// Data of one joint's stroke.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepWiseJoint {
     /// Index of the joint in the model.
     pub joint: usize,
-    /// Constants of the stroke; positions are relative to its start.
+    /// Constants of the stroke; positions are measured from its start.
     pub constants: StrokeConstants,
 }
 
-/// All strokes, in the order of the joint motions; the variables are A, ω, δ of each.
+/// The strokes of all joints, in the order of the motions. The variables of each are amplitude A, steepness ω and
+/// window half width δ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepWiseProblem {
     /// The joints.
@@ -110,19 +113,19 @@ impl StepWiseProblem {
         x.chunks_exact(VARIABLES_PER_STROKE).take(self.joints.len()).map(Stroke::of).collect()
     }
 
-    /// Condition number of each joint's window.
+    /// Condition number of each joint's regressor within its window.
     pub fn condition_numbers(&self, strokes: &[Stroke]) -> Vec<f64> {
         self.joints.iter().zip(strokes).map(|(joint, stroke)| joint.constants.condition_number(stroke)).collect()
     }
 
-    /// Position, velocity, acceleration and rest of one stroke. Limits of the arm's place are checked on the whole
-    /// motion.
+    /// Limits of position, velocity, acceleration and rest of one stroke. Limits of places in the workspace are
+    /// checked on the whole motion.
     pub fn limits(&self, place: usize, stroke: &Stroke) -> [StrokeLimit; 5] {
         self.joints[place].constants.limits(stroke)
     }
 
-    /// H of equation 19: the sum of the condition numbers, with the penalty if a limit is violated (once, as in the
-    /// paper).
+    /// H of equation 19: the sum of the condition numbers, plus a constant penalty if any limit is violated (added
+    /// once, as in the paper).
     ///
     /// # Panics
     /// If `x` has fewer than three entries per joint.
@@ -133,10 +136,10 @@ impl StepWiseProblem {
         self.condition_numbers(&strokes).iter().sum::<f64>() + if kept { 0.0 } else { penalty }
     }
 
-    /// H with a penalty that grows with the violation: Σ cond + penalty · Σ max(0, value/limit - 1). Inside the limits
-    /// it equals H, and its minimum is the same, because the penalty exceeds the gain of a violation. The constant
-    /// penalty of equation 19 has no slope towards the limit, so that the covariance of evolution strategies collapses
-    /// there.
+    /// H with a penalty that grows with the violation: Σ cond + penalty · Σ max(0, value/limit - 1). Inside the
+    /// limits it equals H. Its minimum is the same, because the penalty exceeds the gain by a violation. The constant
+    /// penalty of equation 19 has no slope towards the limit, so that the covariance of evolution strategies
+    /// collapses there.
     ///
     /// # Panics
     /// If `x` has fewer than three entries per joint.
@@ -149,8 +152,8 @@ impl StepWiseProblem {
         self.condition_numbers(&strokes).iter().sum::<f64>() + (0..strokes.len()).map(broken).sum::<f64>()
     }
 
-    /// Optimises the strokes by exact gradients, joint by joint, from `starts` random points of the ranges. Returns the
-    /// strokes and the number of evaluations. They keep every limit if any start became feasible.
+    /// Optimises the strokes by exact gradients, joint by joint, from `starts` random points of the ranges. Returns
+    /// the strokes and the number of evaluations. The strokes keep every limit if any start reached a feasible point.
     ///
     /// # Errors
     /// A constant out of range; no start.

@@ -4,9 +4,10 @@
 pub(super) struct Singular3([f64; 3]);
 
 impl Singular3 {
-    /// Computes the singular values of the matrix with these rows: triangular factor by Givens rotations, row by row,
-    /// then one-sided Jacobi rotations of its columns (Golub and Van Loan, *Matrix Computations*, 2013, sections 5.2
-    /// and 8.6). The matrix is not squared, so that condition numbers up to about 1e15 are accurate.
+    /// Computes the singular values of the matrix with these rows. Givens rotations reduce the rows to a triangular
+    /// factor one by one; one-sided Jacobi rotations of its columns follow (Golub and Van Loan, *Matrix
+    /// Computations*, 2013, sections 5.2 and 8.6). The matrix is not squared, so that condition numbers up to about
+    /// 1e15 are accurate.
     pub(super) fn of_rows(rows: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut r = [[0.0; 3]; 3];
         for mut row in rows {
@@ -14,7 +15,7 @@ impl Singular3 {
                 if row[k] == 0.0 {
                     continue;
                 }
-                // A plain square root is safe for entries of physical size.
+                // A plain square root neither overflows nor underflows for entries of physical size.
                 let length = (r[k][k] * r[k][k] + row[k] * row[k]).sqrt();
                 let (cos, sin) = (r[k][k] / length, row[k] / length);
                 for column in k..3 {
@@ -55,7 +56,7 @@ impl Singular3 {
         Self(values)
     }
 
-    /// Ratio of the largest to the smallest singular value; infinite without full rank.
+    /// Ratio of the largest to the smallest singular value; infinite if the rank is not full.
     pub(super) fn condition_number(&self) -> f64 {
         if self.0[2] > 0.0 { self.0[0] / self.0[2] } else { f64::INFINITY }
     }

@@ -3,22 +3,22 @@
 use super::stroke::{PEAK_OF_SECOND, Stroke, StrokeConstants};
 use crate::optimisers::ConstrainedProblem;
 
-/// Samples of a window: the relative error of the condition number is below 1e-4.
+/// Number of samples of a window; with it the relative error of the condition number is below 1e-4.
 const POINTS: usize = 256;
 
-/// Minimises s over A, ω, δ, s, where s is an upper bound of the logarithm of the joint's condition number, under the
-/// limits of equations 17 and 18 as constraints value/limit - 1 <= 0. Joints that move one after another are
-/// independent, so this covers one joint completely.
+/// Minimises s over amplitude A, steepness ω, window half width δ and s. s is an upper bound of the logarithm of the
+/// joint's condition number. The limits of equations 17 and 18 are constraints value/limit - 1 <= 0. Joints that move
+/// one after another are independent, so this covers one joint completely.
 ///
-/// [`StrokeConstants::condition_number`] is discontinuous where δ includes one more sample. Here every window contains
-/// the same number of samples, distributed evenly from -δ to δ (the middles of equal parts), with the same condition
-/// number up to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by 1e-6, so that a solution
-/// within the optimiser's tolerance keeps them strictly.
+/// [`StrokeConstants::condition_number`] is discontinuous where δ includes one more sample. Here every window
+/// contains the same number of samples, evenly distributed from -δ to δ (at the middles of equal parts). The
+/// condition number is the same up to the width of a sample. δ <= T/4 is a constraint. Limits are tightened by 1e-6,
+/// so that a solution within the optimiser's tolerance keeps them strictly.
 ///
-/// The condition number has a kink at the optimum: rotated by A/2, the rows are [q̈, -g sin p | g cos p] with p = q -
-/// A/2, odd and even in time from the mid-point, so that W splits into two blocks, whose largest singular values are
-/// equal at the optimum. The singular values of each block are smooth; so is the problem with one constraint ln σ_large
-/// - ln σ_small - s <= 0 for every pair that can be extreme.
+/// The condition number has a kink at the optimum. Rotated by A/2, the rows of the regressor W are [q̈, -g sin p | g
+/// cos p] with p = q - A/2, odd and even in time from the mid-point. W therefore splits into two blocks, whose
+/// largest singular values are equal at the optimum. The singular values of each block are smooth. The problem is
+/// smooth with one constraint ln σ_large - ln σ_small - s <= 0 for every pair that can be extreme.
 #[derive(Clone, Debug)]
 pub(super) struct SmoothStroke {
     constants: StrokeConstants,
@@ -30,10 +30,10 @@ const PAIRS: usize = 3;
 const CONSTRAINTS: usize = PAIRS + 5;
 const RELATIVE_MARGIN: f64 = 1e-6;
 
-/// A value and its gradient by A, ω, δ.
+/// A value and its gradient with respect to A, ω, δ.
 type Slope = (f64, [f64; 3]);
 
-/// Logarithms of the singular values of the odd block (large and small) and of the even one.
+/// Logarithms of the singular values of the odd block (the larger and the smaller) and of the even block.
 struct LogSingular {
     odd: [Slope; 2],
     even: Slope,
@@ -60,7 +60,7 @@ impl SmoothStroke {
         vec![x[0], x[1], x[2], bound]
     }
 
-    /// Sums over the later half of the window, because the earlier half repeats them.
+    /// Sums over the later half of the window only, because the earlier half contains the same values.
     fn log_singular(&self, stroke: &Stroke) -> LogSingular {
         let Stroke { amplitude_rad: a, steepness_per_s: w, window_s } = *stroke;
         let gravity = self.constants.gravity;
@@ -86,13 +86,14 @@ impl SmoothStroke {
             .collect();
         let product = |i: usize, j: usize| -> f64 { rows.iter().map(|row| row[i].0 * row[j].0).sum() };
         let (aa, ab, bb, cc) = (product(0, 0), product(0, 1), product(1, 1), product(2, 2));
-        // The small eigenvalue of the odd block from its determinant aa·‖b - (ab/aa) a‖², without cancellation.
+        // The smaller eigenvalue of the odd block follows from its determinant aa·‖b - (ab/aa) a‖², without
+        // cancellation.
         let share = ab / aa;
         let rest: f64 = rows.iter().map(|row| (row[1].0 - share * row[0].0).powi(2)).sum();
         let half = 0.5 * (aa - bb);
         let radius = half.hypot(ab);
         let large = 0.5 * (aa + bb) + radius;
-        // Angle of the large eigenvector: tan 2θ = 2 ab/(aa - bb).
+        // Angle of the eigenvector with the larger eigenvalue: tan 2θ = 2 ab/(aa - bb).
         let (sin, cos) = (0.5 * ab.atan2(half)).sin_cos();
         let (mut d_aa, mut d_rest, mut d_large, mut d_cc) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
         for [acceleration, odd, even] in &rows {
@@ -112,7 +113,8 @@ impl SmoothStroke {
         LogSingular { odd: [first, (determinant.0 + second.0 - first.0, small)], even: log(cc, d_cc) }
     }
 
-    /// Value and gradient by A, ω, δ of every limit. All are products of powers: c = s Aᵃ ωʷ δᵈ - 1.
+    /// Value of every limit, and gradient with respect to A, ω, δ. All limits are products of powers: c = s Aᵃ ωʷ δᵈ
+    /// - 1.
     fn limits(&self, stroke: &Stroke) -> [Slope; CONSTRAINTS - PAIRS] {
         let constants = &self.constants;
         let quarter = 0.25 * constants.period_times_steepness;
@@ -145,7 +147,7 @@ impl ConstrainedProblem for SmoothStroke {
 
     fn bounds(&self) -> Vec<[f64; 2]> {
         let mut bounds = self.constants.bounds().to_vec();
-        // The stroke ends below A.
+        // The end position of the stroke is below A.
         bounds[0][1] = bounds[0][1].min(self.constants.position_limit_rad * (1.0 - RELATIVE_MARGIN));
         // Condition numbers are at least 1; above e⁴⁰ no digits are significant.
         bounds.push([0.0, 40.0]);

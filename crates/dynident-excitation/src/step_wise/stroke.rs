@@ -37,7 +37,7 @@ impl Stroke {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum StrokeQuantity {
-    /// Maximum position, A/(1 + e^(-ωT/4)), in rad. The minimum is above zero for every stroke.
+    /// Maximum position, A/(1 + e^(-ωT/4)), in rad. The minimum position of every stroke is above zero.
     Position,
     /// Peak velocity A ω/4, in rad/s.
     Speed,
@@ -49,7 +49,7 @@ pub enum StrokeQuantity {
     RestAcceleration,
 }
 
-/// A limit and the peak of a stroke.
+/// A limit, and the peak of the limited quantity on a stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StrokeLimit {
     /// Limited quantity.
@@ -71,8 +71,8 @@ impl StrokeLimit {
         self.value / self.limit - 1.0
     }
 
-    /// The excess with a margin of 1e-6, zero inside, so that the minimum of a graded penalty keeps the limits
-    /// strictly.
+    /// The excess with a margin of 1e-6, and zero inside the limit. With the margin, the minimum of a graded penalty
+    /// keeps the limits strictly.
     pub(super) fn violation(&self) -> f64 {
         let excess = self.excess();
         (excess + 1e-6 * (1.0 + excess)).max(0.0)
@@ -86,7 +86,7 @@ pub struct StrokeConstants {
     pub gravity: f64,
     /// Sampling rate, Hz; every mid-point is a sample.
     pub rate_hz: f64,
-    /// T ω, period times steepness. At 40 velocity and acceleration at rest are below 1e-4 for every slow stroke.
+    /// T ω, period times steepness. At 40, velocity and acceleration at rest are below 1e-4 for every slow stroke.
     pub period_times_steepness: f64,
     /// Maximum position relative to the start of the stroke, rad; the minimum is 0.
     pub position_limit_rad: f64,
@@ -151,18 +151,18 @@ impl StrokeConstants {
         [self.amplitude_range, self.steepness_range, self.window_range]
     }
 
-    /// Maximum half width of a window, T/4, in s, at which it meets the next one.
+    /// Maximum half width of a window, T/4, in s, at which neighbouring windows meet.
     pub fn longest_window_s(&self, stroke: &Stroke) -> f64 {
         0.25 * self.period_times_steepness / stroke.steepness_per_s
     }
 
-    /// Condition number of the joint's observation matrix while the others rest. M and Q of equations 7 to 10 are then
-    /// the same function of the moving joint, with the rows [q̈, g cos q, -g sin q] (φ11 to φ13; φ24 to φ26), for any
-    /// lengths of the links.
+    /// Condition number of the joint's observation matrix while the other joints rest. The matrices M and Q of
+    /// equations 7 to 10 are then the same function of the moving joint, with the rows [q̈, g cos q, -g sin q] (φ11
+    /// to φ13; φ24 to φ26), for any lengths of the links.
     ///
-    /// Rows are the samples k/rate from a mid-point with |k|/rate <= δ. Falling strokes and further periods repeat the
-    /// same rows, which does not change the condition number, so one rising stroke is sufficient. Infinite without full
-    /// rank.
+    /// Rows are the samples at the times k/rate from a mid-point with |k|/rate <= δ. Falling strokes and further
+    /// periods repeat the same rows, which does not change the condition number, so one rising stroke is sufficient.
+    /// Infinite if the rank is not full.
     pub fn condition_number(&self, stroke: &Stroke) -> f64 {
         let reach = stroke.window_s.min(self.longest_window_s(stroke));
         if !(reach >= 0.0 && reach * self.rate_hz <= 1e6) {
@@ -178,7 +178,7 @@ impl StrokeConstants {
         Singular3::of_rows(rows).condition_number()
     }
 
-    /// Limits of equations 17 and 18.
+    /// Limits of equations 17 and 18, with the peaks of the stroke.
     pub fn limits(&self, stroke: &Stroke) -> [StrokeLimit; 5] {
         // At rest the stroke is at f(-ωT/4).
         let rest = 1.0 / (1.0 + (0.25 * self.period_times_steepness).exp());

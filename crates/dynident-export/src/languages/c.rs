@@ -8,7 +8,7 @@ use core::fmt::Write;
 
 /// Syntax of C expressions; C++ adds a namespace.
 pub(super) struct CSyntax {
-    /// `std::` in C++.
+    /// Namespace prefix of functions: `std::` in C++, empty in C.
     pub(super) functions: &'static str,
     /// Name of the sign function.
     pub(super) sign: String,
@@ -141,7 +141,7 @@ fn write_step(text: &mut String, source: &Source<'_>, step: &StepEquation, synta
     for (place, expression) in tau.iter().enumerate() {
         let _ = writeln!(text, "    tau[{place}] = {expression};");
     }
-    // The deflection of an element depends on no other element.
+    // The deflection of an element does not depend on other elements.
     for (place, expression) in deflections.iter().enumerate() {
         let _ = writeln!(text, "    z[{place}] = {expression};");
     }

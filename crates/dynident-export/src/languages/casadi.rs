@@ -51,7 +51,7 @@ pub(crate) fn casadi_module(source: &Source<'_>) -> String {
         let outputs = source.statements(function, &CasadiSyntax).outputs;
         let flat = vertical(&outputs);
         let made = match function.columns {
-            // CasADi reshapes column by column.
+            // CasADi fills matrices column by column.
             Some(columns) => format!("ca.reshape({flat}, {columns}, {dof}).T"),
             None => flat,
         };
@@ -67,7 +67,7 @@ fn vertical(values: &[String]) -> String {
     format!("ca.vertcat(\n        {},\n    )", values.join(",\n        "))
 }
 
-/// A function of the inputs of `function` after the inputs `before`, which have a name and a length.
+/// Writes a function with the inputs `before` (each with a name and a length), followed by the inputs of `function`.
 fn write_function(
     text: &mut String,
     source: &Source<'_>,

@@ -28,11 +28,11 @@ pub(crate) struct Source<'a> {
     pub(crate) robot: &'a RobotModel,
     pub(crate) equations: &'a Equations,
     pub(crate) notes: &'a [String],
-    /// Numbers of 32 bits in place of 64; in C, C++ and Rust.
+    /// Whether numbers have 32 bits instead of 64; in C, C++ and Rust.
     pub(crate) float32: bool,
 }
 
-/// A number that parses to the same bits; with 32 bits the nearest number of 32 bits.
+/// Text of a number that parses to the same bits; with 32 bits, of the nearest 32-bit number.
 fn number(value: f64, float32: bool) -> String {
     if float32 { format!("{:?}", value as f32) } else { format!("{value:?}") }
 }
@@ -46,7 +46,7 @@ impl Source<'_> {
         statements(&self.equations.graph, &function.values, syntax)
     }
 
-    /// The comment at the head, each line after `mark`.
+    /// The comment at the beginning of the file, with `mark` before each line.
     fn comment(&self, mark: &str) -> String {
         let title = format!(
             "Dynamics of {} ({} joints), written by dynident {}.",

@@ -1,4 +1,5 @@
-//! Python with Pinocchio: a program that builds the model, with the torque of the drives from the graph.
+//! Python with Pinocchio: a program that builds the model of the bodies; the torque of the drives comes from the
+//! graph.
 
 use super::Source;
 use super::python::{ArraySyntax, python_string, write_function, write_helpers};
@@ -71,7 +72,7 @@ const BUILD: &str = "def build():
     return model
 ";
 
-/// A limit; infinite if unknown.
+/// Text of a limit; infinite if unknown.
 fn limit(value: Option<f64>, sign: &str) -> String {
     value.filter(|value| value.is_finite()).map_or_else(|| format!("{sign}np.inf"), |value| format!("{value:?}"))
 }
@@ -102,7 +103,7 @@ fn joint_entry(source: &Source<'_>, index: usize) -> String {
     )
 }
 
-/// Positions of the joints of the tree from those of the independent joints: `EXPANSION q + OFFSET`.
+/// Positions of the joints of the tree from those of the independent joints, `EXPANSION q + OFFSET`.
 fn expansion(model: &Model) -> String {
     let (count, dof) = (model.tree_joints().len(), model.dof());
     let Some(coupling) = model.coupling() else {
@@ -118,7 +119,7 @@ fn expansion(model: &Model) -> String {
     format!("# Dependent joints follow the others.\nEXPANSION, OFFSET = np.array({matrix:?}), np.array({offsets:?})\n")
 }
 
-/// Drive inertia outside of the diagonal.
+/// Entries of drive inertia outside the diagonal of the mass matrix.
 fn shared_inertia(source: &Source<'_>) -> String {
     let (dof, all) = (source.dof(), drive_inertia(source.robot));
     let entry = |row: usize, column: usize| if row == column { 0.0 } else { all[row * dof + column] };

@@ -92,7 +92,7 @@ pub(super) fn write_helpers(text: &mut String, source: &Source<'_>, library: &st
     }
 }
 
-/// The arguments as arrays, in `given` and by their names.
+/// Lines that convert the arguments to arrays: in `given`, and by their names.
 fn given(function: &Equation) -> String {
     let names = function.arguments();
     let tuple = if function.inputs.len() == 1 { format!("{names},") } else { names };
@@ -148,7 +148,7 @@ fn write_step(text: &mut String, source: &Source<'_>, step: &StepEquation, synta
     text.push_str("    state.last = q.copy()\n    return tau\n");
 }
 
-/// The function with state as a pure function, for libraries that transform functions.
+/// Writes the function with state as a pure function, for libraries that transform functions.
 pub(super) fn write_pure_step(text: &mut String, source: &Source<'_>, step: &StepEquation, syntax: &ArraySyntax) {
     let (function, elements, library) = (&step.equation, step.elements, syntax.library);
     let statements = source.statements(function, syntax);

@@ -17,7 +17,7 @@ impl Syntax for RustSyntax {
 
     fn call(&self, function: Function, of: &str) -> String {
         match function {
-            // The only function in `core`.
+            // The only elementary function that `core` has.
             Function::Abs => format!("({of}).abs()"),
             Function::Ln => format!("M::ln({of})"),
             other => format!("M::{}({of})", other.name()),

@@ -1,4 +1,5 @@
-//! Columns of one Arrow record batch: finds, unpacks and checks buffers, so that values can be read without errors.
+//! Columns of one Arrow record batch: finds, decompresses and checks its buffers, so that values can then be read
+//! without errors.
 
 use super::flat::Flat;
 use super::schema::{Cell, Leaf, List, Place};
@@ -22,11 +23,12 @@ pub(super) struct Batch {
     pub(super) rows: usize,
     /// Number of entries of each field.
     entries: Vec<usize>,
-    /// Offset and length of each buffer, and the number of additional buffers of each view field.
+    /// Offset and length of each buffer, and the number of additional buffers of each view field (Arrow's layout for
+    /// texts in several buffers).
     buffers: Vec<[i64; 2]>,
     views: Vec<[i64; 1]>,
     packing: Packing,
-    /// Start of the buffers in the file, and their total length in bytes.
+    /// Start of the buffers in the file, and their total length, bytes.
     begin: u64,
     bytes: u64,
 }
@@ -56,7 +58,7 @@ impl Flags {
     }
 }
 
-/// Moves to `at`; bytes that are already buffered are not read again.
+/// Moves the reader to `at`; bytes that are already buffered are not read again.
 pub(super) fn move_to(reader: &mut BufReader<File>, at: u64) -> std::io::Result<()> {
     let now = reader.stream_position()?;
     reader.seek_relative(at as i64 - now as i64)
@@ -85,9 +87,9 @@ impl Batch {
         Ok(Self { rows, entries, buffers: batch.numbers(2), views: batch.numbers(4), packing, begin, bytes })
     }
 
-    /// Reads a column; takes its memory from `left`.
+    /// Reads a column and subtracts its memory from `left`.
     fn load(&self, leaf: &Leaf, reader: &mut BufReader<File>, left: &mut Budget) -> Result<Loaded, String> {
-        // Groups and lists have one entry per row; values inside lists have the number of entries of their field.
+        // Groups and lists have one entry per row; values inside lists have as many entries as their field.
         let mut around = Vec::new();
         for place in &leaf.around {
             around.push(self.flags(*place, self.rows, reader, left)?);
@@ -126,7 +128,7 @@ impl Batch {
         Ok(loaded)
     }
 
-    /// Index of the `which`-th buffer of a field.
+    /// Index of the `which`-th buffer of a field among the buffers of the batch.
     fn number(&self, place: Place, which: usize) -> usize {
         let views = self.views.iter().take(place.views);
         let more = views.filter_map(|[count]| usize::try_from(*count).ok());
@@ -225,7 +227,7 @@ impl Batch {
 }
 
 impl Loaded {
-    /// Index of entry `entry` of a row; `None` if it is missing.
+    /// Index of entry `entry` of a row in the values; `None` if it is missing.
     fn place(&self, row: usize, entry: usize) -> Option<usize> {
         if self.around.iter().any(|flags| !flags.has(row)) {
             return None;
@@ -241,7 +243,7 @@ impl Loaded {
         self.flags.has(at).then_some(at)
     }
 
-    /// Entry `entry` of a row, time stamps relative to `first`; NaN if it is missing.
+    /// Value of entry `entry` of a row; time stamps are relative to `first`; NaN if it is missing.
     pub(super) fn value(&self, row: usize, entry: usize, first: i64) -> f64 {
         let Some(at) = self.place(row, entry) else { return f64::NAN };
         match self.cell {

@@ -19,12 +19,12 @@ impl<'a> Flat<'a> {
         Some(Bytes::new(self.bytes.get(at..)?, false))
     }
 
-    /// The table at the offset stored at `at`.
+    /// The table to which the offset stored at `at` refers.
     fn followed(&self, at: usize) -> Option<Self> {
         Some(Self { bytes: self.bytes, at: self.pointed(at)? })
     }
 
-    /// The position of the offset stored at `at`.
+    /// The position to which the offset stored at `at` refers.
     fn pointed(&self, at: usize) -> Option<usize> {
         let offset = self.read(at)?.u32()?;
         at.checked_add(offset as usize).filter(|place| *place < self.bytes.len())
@@ -44,7 +44,7 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// A number of one byte; 0 if absent, as in the following methods.
+    /// A one-byte number; 0 if the field is absent, also in the following methods.
     pub(super) fn u8(&self, slot: usize) -> u8 {
         self.place(slot).and_then(|at| self.read(at)?.u8()).unwrap_or(0)
     }

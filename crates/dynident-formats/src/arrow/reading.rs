@@ -89,8 +89,8 @@ fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> 
     FileError::broken(path, FileFormat::Arrow, place, problem, "write or copy it again")
 }
 
-/// End of the messages in a file of `length` bytes: the start of the footer, whose length and the magic bytes are at
-/// the end of the file.
+/// End of the messages in a file of `length` bytes, which is the start of the footer. The length of the footer and
+/// the magic bytes are at the end of the file.
 fn end_of_messages(reader: &mut BufReader<File>, length: u64) -> std::io::Result<Result<u64, &'static str>> {
     let mut tail = [0; 4 + MAGIC.len()];
     let Some(tail_at) = length.checked_sub(tail.len() as u64).filter(|at| *at >= 8) else {
@@ -147,7 +147,7 @@ impl ArrowTable {
         Ok(Some(Message { head, begin, bytes }))
     }
 
-    /// A message that extends beyond the end of the file.
+    /// Handles a message that extends beyond the end of the file.
     fn cut(&mut self) -> Result<Option<Message>, FileError> {
         if self.stream && self.batches > 0 {
             self.truncated = true;
@@ -220,7 +220,7 @@ impl ArrowTable {
         Ok(())
     }
 
-    /// Reads the requested leaves of the next batch with rows; false at the end.
+    /// Reads the requested columns of the next batch with rows; false at the end.
     fn next_batch(&mut self, asked_for: impl Fn(usize) -> bool) -> Result<bool, FileError> {
         loop {
             let Some(message) = self.message()? else { return Ok(false) };

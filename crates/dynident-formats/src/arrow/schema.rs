@@ -41,7 +41,7 @@ impl Cell {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum List {
-    /// By the offset of its first entry and that of the next list, of 8 or 4 bytes.
+    /// Each list is given by the offset of its first entry and that of the next list, of 8 or 4 bytes.
     Offsets { wide: bool },
     /// All lists have this length.
     Fixed(usize),
@@ -71,7 +71,7 @@ enum Kind {
         buffers: usize,
         views: bool,
     },
-    /// Unknown: the places of the following fields cannot be determined.
+    /// Unknown type, so that the buffers of the following fields cannot be found.
     Unknown,
 }
 
@@ -218,7 +218,7 @@ impl Walk {
         self.beyond(field, buffers, views, depth)
     }
 
-    /// Skips a field's buffers and its children; those of a dictionary are in separate batches.
+    /// Skips the buffers of a field and its children; the values of a dictionary are in separate batches.
     fn beyond(&mut self, field: Flat, buffers: usize, views: bool, depth: usize) -> Option<()> {
         self.next.buffer += buffers;
         self.next.views += usize::from(views);

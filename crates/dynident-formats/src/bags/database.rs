@@ -19,7 +19,7 @@ pub(super) struct Database {
     fields: [usize; 3],
 }
 
-/// Indices of columns in the SQL statement that created a table.
+/// Indices of columns in the SQL statement that created a table, by their names.
 fn places<const N: usize>(text: &str, names: [&str; N]) -> Option<[usize; N]> {
     let list = text.split_once('(')?.1;
     let columns: Vec<&str> = list

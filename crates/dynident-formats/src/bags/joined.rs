@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 const MAX_WAITING_ROWS: usize = 1 << 20;
-/// Minimum length of a gap, mean steps.
+/// Minimum length of a gap, in mean sampling intervals.
 const MIN_GAP_STEPS: f64 = 5.0;
 const MIN_STEPS_FOR_MEAN: u64 = 8;
 
@@ -17,7 +17,7 @@ struct Side {
     first_ns: i64,
     last_ns: i64,
     steps: u64,
-    /// Times of the samples in the queue that end a gap.
+    /// Times of the samples in the queue that follow a gap.
     holes: VecDeque<i64>,
 }
 
@@ -98,7 +98,7 @@ impl Joined {
                     return Some(row);
                 }
                 Outcome::Wait if !self.ended => return None,
-                // Before the first or after the last message of a topic.
+                // The time is before the first or after the last message of a topic.
                 Outcome::Early | Outcome::Wait => {
                     self.rows.pop_front();
                 }
@@ -108,7 +108,7 @@ impl Joined {
 }
 
 impl Side {
-    /// Its values at `at_ns`: linear between the neighbours, NaN in a gap.
+    /// The values of the topic at `at_ns`: linear between the neighbouring samples, NaN in a gap.
     fn at(&mut self, at_ns: i64) -> Outcome {
         while self.samples.get(1).is_some_and(|next| next.0 <= at_ns) {
             self.samples.pop_front();

@@ -31,7 +31,7 @@ pub(super) struct McapFile {
     reader: LinearReader,
     schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Channel>,
-    /// The current chunk, decompressed, and the position of its next record.
+    /// Current chunk, decompressed, and the position of its next record.
     chunk: Vec<u8>,
     at: usize,
     records: u64,
@@ -48,7 +48,7 @@ impl core::fmt::Debug for McapFile {
 impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, FileError> {
         let file = unpacked::open(path)?;
-        // Decompress chunks here, because the lengths inside may be wrong.
+        // Chunks are decompressed here and not by the library, because the lengths in them may be wrong.
         let options = LinearReaderOptions::default()
             .with_record_length_limit(MAX_RECORD_BYTES)
             .with_emit_chunks(true)
@@ -116,7 +116,8 @@ impl McapFile {
         record.map(Some).map_err(|error| self.broken(&error))
     }
 
-    /// Stores a schema or channel. For a message, returns its channel and time and writes its bytes to `message`.
+    /// Stores a schema or a channel. For a message, it returns the channel and the time, and writes the bytes to
+    /// `message`.
     fn take(&mut self, record: Record, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError> {
         match record {
             Record::Schema { header, data } => {
@@ -185,7 +186,7 @@ impl Part for McapFile {
                 }
                 Some(Err(error)) => return Err(self.broken(&error)),
             };
-            // Read in steps, because a corrupt length may exceed the file.
+            // Read in steps, because a wrong length may exceed the file.
             let space = self.reader.insert(wanted.clamp(1, 1 << 18));
             let read = self.file.read(space);
             let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;

@@ -48,7 +48,7 @@ pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut lines = text.lines().skip_while(|line| !line.trim_start().starts_with("relative_file_paths:")).skip(1);
     let mut parts = Vec::new();
     while let Some(name) = lines.next().and_then(|line| line.trim_start().strip_prefix("- ")) {
-        // Old bags include the folder in the names of parts.
+        // Old bags contain the folder in the names of their parts.
         let name = name.trim().trim_matches(['"', '\'']);
         let name = Path::new(name).file_name().ok_or_else(|| broken(format!("`{name}` is not a file name")))?;
         let part = folder.join(name);

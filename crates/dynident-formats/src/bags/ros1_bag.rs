@@ -13,7 +13,7 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Maximum length of the header or the data of a record, and of an unpacked chunk, bytes.
 const MAX_RECORD_BYTES: u32 = 1 << 28;
 
-/// Maximum length of the definitions of all connections, bytes: compressed ones could fill the memory.
+/// Maximum length of the definitions of all connections, bytes, because compressed definitions could fill the memory.
 const MAX_DEFINITION_BYTES: usize = 1 << 26;
 
 const MESSAGE: u8 = 2;
@@ -27,7 +27,7 @@ pub(super) struct Ros1Bag {
     path: PathBuf,
     reader: Box<dyn Read + Send>,
     channels: HashMap<usize, Channel>,
-    /// Bytes of the definitions that were read.
+    /// Number of bytes of definitions that were read.
     definition_bytes: usize,
     /// The current chunk, unpacked, and the position of its next record.
     chunk: Vec<u8>,
@@ -42,7 +42,7 @@ impl core::fmt::Debug for Ros1Bag {
     }
 }
 
-/// Fields of the header of a record or connection: `name=value`, each after its length.
+/// Fields of the header of a record or connection; each is `name=value`, preceded by its length.
 fn fields(bytes: &[u8]) -> Option<HashMap<&[u8], &[u8]>> {
     let mut bytes = Bytes::new(bytes, false);
     let mut found = HashMap::new();
@@ -102,7 +102,7 @@ impl Ros1Bag {
             return Err(self.broken("it is longer than 256 MiB"));
         }
         bytes.clear();
-        // Grow with the available bytes, not with the stated length.
+        // The buffer grows with the available bytes, not with the given length, which may be wrong.
         self.reader.by_ref().take(u64::from(length)).read_to_end(&mut bytes).map_err(io)?;
         if bytes.len() < length as usize {
             self.truncated = true;
@@ -135,7 +135,7 @@ impl Ros1Bag {
         Ok(())
     }
 
-    /// The next record in the chunk: header and data.
+    /// The next record in the current chunk: header and data.
     fn in_chunk(&mut self) -> Result<Option<Record>, FileError> {
         let rest = &self.chunk[self.at..];
         if rest.is_empty() {
@@ -204,7 +204,7 @@ impl Part for Ros1Bag {
                     *message = data;
                     return Ok(Some((connection, i64::from(seconds) * 1_000_000_000 + i64::from(ns))));
                 }
-                // Header of the bag, indices.
+                // The header of the bag and the indices are not needed.
                 _ => {}
             }
         }

@@ -33,9 +33,10 @@ pub(super) struct Sqlite {
 /// A traversal of the rows of one table, by row number.
 #[derive(Debug)]
 pub(super) struct Rows {
-    /// Pages from the root down, with the next cell of each.
+    /// Pages from the root of the tree down to the current one, with the next cell of each.
     way: Vec<(Vec<u8>, u64, usize)>,
-    /// Number of pages read; it exceeds the number of pages only if pages refer to each other in a circle.
+    /// Number of pages read. It exceeds the number of pages in the file only if pages refer to each other in a
+    /// circle.
     read: u64,
 }
 

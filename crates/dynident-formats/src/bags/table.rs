@@ -12,10 +12,10 @@ use crate::table::{ColumnGroup, Table};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of messages, and of their bytes, that are searched for topics and columns.
+/// Maximum number of messages that are searched for topics and columns, and maximum number of their bytes.
 const MAX_SEARCHED_MESSAGES: u64 = 20_000;
 const MAX_SEARCHED_BYTES: usize = 1 << 26;
-/// Number of messages per topic that are searched for columns; several publishers may alternate.
+/// Number of messages per topic that are searched for columns; several, because publishers may alternate on a topic.
 const MAX_SEARCHED_PER_TOPIC: u64 = 64;
 
 /// Opens one file, possibly compressed as a whole.
@@ -55,11 +55,11 @@ struct BagTable {
 
 #[derive(Debug)]
 struct Plan {
-    /// The topics, starting with the one that provides the clock, and the columns of each.
+    /// Index of each topic, starting with the topic that provides the times, and its columns.
     topics: Vec<(usize, Vec<usize>)>,
     /// Index of each selected column in a joined row.
     places: Vec<usize>,
-    /// Whether topics are joined by the stamps of their messages.
+    /// Whether topics are joined by the time stamps in their messages instead of their recording times.
     by_stamp: bool,
     joined: Joined,
     ended: bool,
@@ -126,7 +126,7 @@ impl BagTable {
         self.topic_of.clear();
         let mut kept = Vec::new();
         for mut topic in core::mem::take(&mut self.topics) {
-            // A topic with a time column only has no data.
+            // A topic that has only a time column has no data.
             if topic.columns.len() == 1 {
                 let note = format!("{} ({}): not numeric", topic.name, topic.kind);
                 if !self.notes.iter().any(|known| known.starts_with(&format!("{} (", topic.name))) {
@@ -148,14 +148,14 @@ impl BagTable {
         Ok(())
     }
 
-    /// The topic of the current message. During the search for columns, a new topic is added.
+    /// The topic of the current message. While columns are searched, a new topic is added.
     fn topic(&mut self, header: Header) -> Option<usize> {
         if let Some(known) = self.topic_of.get(&header.channel) {
             return *known;
         }
         let channel = self.messages.channel(header)?;
         let mut found = self.topics.iter().position(|topic| topic.is_of(channel));
-        // Names are fixed after the search; later topics have no columns.
+        // Names are fixed after the search; topics found later have no columns.
         if found.is_none() && self.groups.is_empty() {
             match Topic::new(channel) {
                 Ok(topic) => {

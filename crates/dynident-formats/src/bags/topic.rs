@@ -17,7 +17,7 @@ const PROTOBUF_STAMPS: &[&str] = &["header.stamp", "header.timestamp", "timestam
 enum Reader {
     /// Possible definitions of the messages; the first one that fits is kept.
     Binary(Vec<Binary>),
-    /// Messages that name their numbers.
+    /// Messages that contain the names of their numbers.
     Named(fn(&[u8]) -> Result<Value, String>),
 }
 
@@ -56,12 +56,12 @@ pub(super) struct Topic {
     pub(super) columns: Vec<String>,
     column_of: HashMap<String, usize>,
     leaves: Leaves,
-    /// Shape of the previous message, and the column of each of its leaves.
+    /// Shape of the previous message, and the column of each of its numbers.
     shape: Vec<u8>,
     column_of_leaf: Vec<Option<usize>>,
     /// First value of each column of time stamps, ns.
     origins_ns: HashMap<usize, i64>,
-    /// Preference and column of the time stamp, if its messages have nonzero ones.
+    /// Order of preference and column of the time stamp, if its messages have nonzero time stamps.
     stamp: Option<(usize, usize)>,
     pub(super) messages: u64,
 }
@@ -216,7 +216,8 @@ impl Topic {
     }
 }
 
-/// Seconds after the first value, from integer nanoseconds, so that the only error is rounding to a double.
+/// Seconds after the first value. They are computed from integer nanoseconds, so that the only error is rounding to a
+/// double.
 fn seconds(ns: i64, origin: Option<&i64>) -> f64 {
     (i128::from(ns) - i128::from(origin.copied().unwrap_or(0))) as f64 / 1e9
 }

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 
 const HEADER_BYTES: usize = 16;
 const MAX_NESTING: usize = 8;
-/// Maximum number of subscriptions, and of bytes of each definition: a short message would cause a long text.
+/// Maximum number of subscriptions, and maximum number of bytes of each definition: a few bytes in the file could
+/// define a long text.
 const MAX_CHANNELS: usize = 2000;
 const MAX_DEFINITION_BYTES: usize = 1 << 16;
 

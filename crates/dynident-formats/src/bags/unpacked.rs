@@ -45,7 +45,8 @@ pub(super) fn open(path: &Path) -> Result<File, FileError> {
     Ok(file)
 }
 
-/// Format inside a compressed file with these first bytes; that of the file itself if it is not compressed.
+/// Format of the decompressed content of a compressed file with these first bytes; for other files the format of the
+/// file itself.
 pub(crate) fn inner_format(path: &Path) -> Result<FileFormat, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let mut reader = BufReader::with_capacity(BLOCK_BYTES, dynident_files::open(path).map_err(io)?);

@@ -20,7 +20,7 @@ pub(crate) struct ProtobufDecoder {
 enum Content<'a> {
     Missing,
     Numbers(Vec<f64>),
-    /// Texts, or messages.
+    /// Texts, messages, or the bytes of skipped fields.
     Parts(Vec<&'a [u8]>),
 }
 
@@ -132,7 +132,7 @@ impl Pass<'_, '_> {
             let field = &own.fields[place];
             let content = &mut contents[place];
             if !field.is_repeated && !matches!(field.kind, FieldKind::Message(_)) {
-                // The last value is valid.
+                // If a field occurs several times, the last value is valid.
                 *content = Content::Missing;
             }
             add(field, value, content)?;
@@ -154,7 +154,7 @@ impl Pass<'_, '_> {
                     return self.messages_of(field.kind, parts, labels, depth);
                 }
                 self.shape(1);
-                // Parts of one message are merged: a message is the concatenation of its parts.
+                // A message in several parts is the concatenation of these parts.
                 match parts[..] {
                     [part] => self.part(field.kind, part, labels, depth),
                     _ => self.part(field.kind, &parts.concat(), labels, depth),

@@ -11,10 +11,10 @@ const MAX_NESTING: usize = 16;
 pub(super) enum FieldKind {
     Double,
     Float,
-    /// A varint that is negative in two's complement.
+    /// A variable-length integer, negative numbers in two's complement.
     Signed,
     Unsigned,
-    /// A varint in the zigzag code.
+    /// A variable-length integer in the zigzag code (small numbers of either sign are short).
     Zigzag,
     Fixed64,
     Fixed32,
@@ -37,7 +37,7 @@ pub(super) struct SchemaField {
     pub(super) number: u32,
     pub(super) kind: FieldKind,
     pub(super) is_repeated: bool,
-    /// Whether a number that is not in the message is zero, otherwise it is missing.
+    /// Whether a number that is absent from the message is zero; otherwise it is missing.
     pub(super) is_implicit: bool,
 }
 
@@ -46,12 +46,12 @@ pub(super) struct SchemaMessage {
     pub(super) fields: Vec<SchemaField>,
     /// Whether it is an entry of a map: key and value.
     pub(super) is_map_entry: bool,
-    /// Numbers of the fields with their places, in ascending order.
+    /// Numbers of the fields with their indices, in ascending order.
     places: Vec<(u32, usize)>,
 }
 
 impl SchemaMessage {
-    /// Place of the field with this number.
+    /// Index of the field with this number.
     pub(super) fn place(&self, number: u32) -> Option<usize> {
         let at = self.places.binary_search_by_key(&number, |(known, _)| *known).ok()?;
         Some(self.places[at].1)
@@ -78,7 +78,7 @@ struct Described {
     messages: Vec<(Vec<DescribedField>, bool)>,
 }
 
-/// Whether fields of a file or of a message track their presence.
+/// Whether fields of a file or of a message record if they were set.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Presence {
     Explicit,
@@ -154,7 +154,8 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// `field_presence` of the options in a file or a field; `features` is the number of their field.
+/// Value of `field_presence` in the options of a file or a field; `features` is the number of the field `features` in
+/// these options.
 fn presence(options: &[u8], features: u32) -> Result<Option<Presence>, String> {
     let mut found = None;
     each(options, |number, value| match value {
@@ -170,7 +171,7 @@ fn presence(options: &[u8], features: u32) -> Result<Option<Presence>, String> {
 }
 
 impl Described {
-    /// A `FileDescriptorProto`.
+    /// Reads a `FileDescriptorProto`.
     fn file(&mut self, bytes: &[u8]) -> Result<(), String> {
         let (mut package, mut default, mut messages) = (String::new(), Presence::Explicit, Vec::new());
         each(bytes, |number, value| {
@@ -186,7 +187,7 @@ impl Described {
         messages.into_iter().try_for_each(|message| self.message(message, &package, default, 0))
     }
 
-    /// A `DescriptorProto`.
+    /// Reads a `DescriptorProto`.
     fn message(&mut self, bytes: &[u8], scope: &str, default: Presence, depth: usize) -> Result<(), String> {
         if depth > MAX_NESTING {
             return Err(format!("messages are nested more than {MAX_NESTING} times"));
@@ -212,7 +213,7 @@ impl Described {
     }
 }
 
-/// A `FieldDescriptorProto`.
+/// Reads a `FieldDescriptorProto`.
 fn described_field(bytes: &[u8], default: Presence) -> Result<DescribedField, String> {
     let (mut name, mut type_name) = (String::new(), String::new());
     let (mut field_number, mut label, mut type_number) = (0, 0, 0);
@@ -227,7 +228,7 @@ fn described_field(bytes: &[u8], default: Presence) -> Result<DescribedField, St
             (8, WireValue::Bytes(options)) => {
                 presence_of_field = presence(options, 21)?.unwrap_or(presence_of_field);
             }
-            // In a `oneof`, which includes `optional` in proto3.
+            // The field is in a `oneof`, also if it is `optional` in proto3.
             (9, _) => has_own_presence = true,
             _ => {}
         }

@@ -1,4 +1,4 @@
-//! The wire format: fields with their numbers and values.
+//! The wire format of Protocol Buffers: fields with their numbers and values.
 
 /// The value of a field, not yet interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

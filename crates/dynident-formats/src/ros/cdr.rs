@@ -32,9 +32,9 @@ impl Leaves {
 /// Serialisation of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// After a header of four bytes; numbers are aligned to their length.
+    /// CDR: after a header of four bytes, numbers are aligned to their length.
     Cdr,
-    /// Little-endian, without alignment.
+    /// ROS 1: little-endian, without alignment.
     Ros1,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Decoder {
 struct Pass<'a, 'l> {
     messages: &'a [Vec<Field>],
     bytes: Bytes<'a>,
-    /// Maximum alignment: 8, 4 in version 2 of the encoding, 1 without alignment.
+    /// Maximum alignment, bytes: 8, or 4 in version 2 of the encoding, or 1 without alignment.
     widest: usize,
     leaves: &'l mut Leaves,
     path: Option<String>,
@@ -81,7 +81,7 @@ impl Decoder {
         let path = named.then(String::new);
         let mut pass = Pass { messages: &self.definition.messages, bytes, widest, leaves, path };
         pass.message(0, &[])?;
-        // The middleware may pad the last word.
+        // The middleware may pad the message to a multiple of its alignment, so a few bytes may be left.
         if pass.bytes.left() >= 8 { Err("it is longer than defined".to_owned()) } else { Ok(()) }
     }
 }
@@ -122,7 +122,7 @@ impl<'a> Pass<'a, '_> {
             return Ok(());
         }
         if fields.is_empty() {
-            // rosidl adds one byte to an empty message.
+            // The code generator of ROS 2, rosidl, adds one byte to an empty message.
             return self.bytes.u8().map(|_| ()).ok_or_else(cut);
         }
         let mut own: Option<Vec<&'a [u8]>> = None;
@@ -135,7 +135,8 @@ impl<'a> Pass<'a, '_> {
                 *path += &field.name;
             }
             let found = match field.count {
-                // Names also apply to nested messages: joint names to the arrays of a trajectory point.
+                // Names also apply to nested messages: joint names also name the entries of the arrays of a
+                // trajectory point.
                 Count::One => self.element(field.kind, own.as_deref().unwrap_or(labels)).map(|()| None),
                 Count::Exactly(count) => self.array(field, count, own.as_deref().unwrap_or(labels)),
                 Count::Any => {

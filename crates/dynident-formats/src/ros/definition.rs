@@ -36,7 +36,7 @@ pub(crate) enum Kind {
 pub(crate) enum Count {
     One,
     Exactly(usize),
-    /// Stored before the elements.
+    /// The number of elements is stored before the elements.
     Any,
 }
 
@@ -153,12 +153,13 @@ fn short(name: &str) -> String {
     }
 }
 
-/// Type, count and name of a field declaration; `None` for constants, comments and blank lines.
+/// Type, count and name in a field declaration; `None` for constants, comments and blank lines.
 fn declaration(line: &str) -> Result<Option<(&str, Count, &str)>, String> {
     let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
     let (Some(kind), Some(name)) = (words.next(), words.next()) else { return Ok(None) };
     let wrong = || format!("`{}` is not a field declaration", line.trim());
-    // Constants: `TYPE NAME=value`, possibly with blanks around the sign; the default of a field has no sign.
+    // Constants are `TYPE NAME=value`, possibly with blanks around the equals sign; the default of a field has no
+    // equals sign.
     if name.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
         return Ok(None);
     }
@@ -176,7 +177,7 @@ fn declaration(line: &str) -> Result<Option<(&str, Count, &str)>, String> {
             (kind, count)
         }
     };
-    // `string<=20`.
+    // `string<=20` is a text of limited length.
     Ok(Some((kind.split("<=").next().unwrap_or(kind), count, name)))
 }
 

@@ -1,6 +1,7 @@
 //! Uncertainty of the exported bodies, averaged over explanations of the differences from the robot description.
 
-use super::description::DescriptionDifferences;
+use super::differences::Differences;
+use super::parts::Part;
 use dynident_estimation::changes::Explanation;
 use dynident_estimation::{HALF_WIDTH_95, normal_below};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -54,7 +55,7 @@ fn half_width_95(normals: &[(f64, f64, f64)]) -> f64 {
     high
 }
 
-impl DescriptionDifferences {
+impl Differences {
     /// Distribution of the error of the exported bodies `π̂` (`written`), whose values in the robot description are
     /// `nominal`. If explanation e is true, the parameters are normally distributed with mean `μ_e` and covariance
     /// `Σ_e`:
@@ -90,7 +91,8 @@ impl DescriptionDifferences {
     fn posterior(&self, explanation: &Explanation) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut prior = self.spreads[explanation.covariance].clone();
         for &group in &explanation.groups {
-            let (first, unknowns) = (10 * self.bodies[group], &self.unknowns[group]);
+            let Part::Body(body) = self.parts[group] else { continue };
+            let (first, unknowns) = (10 * body, &self.unknowns[group]);
             let own = unknowns * unknowns.transpose() * explanation.scale.powi(2);
             let mut block = prior.view_mut((first, first), (10, 10));
             block += own;

@@ -5,7 +5,6 @@ use crate::between_logs::{fit_alone, fit_without};
 use crate::training::Training;
 use dynident_estimation::changes::{ChangeSettings, explanations};
 use dynident_estimation::{Estimate, EstimationError, WeightedSettings, weighted_least_squares};
-use dynident_model::terms::TorqueTerm;
 use nalgebra::{DMatrix, DVector};
 
 /// Minimum probability of all explanations that contain the body, for a load to be reported.
@@ -80,16 +79,9 @@ fn load_between(training: &Training, own: &Estimate, others: &Estimate) -> Resul
     let difference = DVector::from_fn(rows.len(), |k, _| own.values[rows[k]] - others.values[rows[k]]);
     let both = own.joint_covariance() + others.joint_covariance();
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| both[(rows[a], rows[b])]);
-    let inertial = robot.model().inertial_count();
-    let size = |term: &TorqueTerm| {
-        let column = robot.terms().iter().position(|other| other == term).map(|place| inertial + place);
-        let row = base.independent().iter().position(|&independent| Some(independent) == column);
-        row.map_or(0.0, |row| {
-            let of = |fit: &Estimate| fit.values[row].abs() + fit.std[row];
-            of(own).max(of(others))
-        })
-    };
-    let parts = parts(robot.model(), base, &rows, &size);
+    let size = |fit: &Estimate, row: usize| fit.values[row].abs() + fit.std[row];
+    let sizes: Vec<f64> = rows.iter().map(|&row| size(own, row).max(size(others, row))).collect();
+    let parts = parts(robot.model(), base, &rows, &sizes);
     if rows.is_empty() || parts.groups.is_empty() {
         return Ok(None);
     }

@@ -15,7 +15,7 @@ const ROBOT_SHARE: f64 = 0.03;
 const TERM_SHARE: f64 = 0.5;
 
 /// A part of the robot that may have changed: a body, or friction and drive terms of joints.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     /// Body with this index.
     Body(usize),
@@ -28,6 +28,11 @@ pub enum Part {
 }
 
 impl Part {
+    /// Index of the body.
+    pub fn body(&self) -> Option<usize> {
+        if let Self::Body(body) = self { Some(*body) } else { None }
+    }
+
     /// Name of the part in a sentence.
     pub fn words(&self, model: &Model) -> String {
         let joint = |joint: &usize| &model.joints()[*joint].name;
@@ -65,10 +70,17 @@ pub(super) fn effects(base: &BaseParameters) -> DMatrix<f64> {
     all
 }
 
-/// Lists the parts of a robot with their effects on the base parameters with the indices `rows`. `size_of_term` is the
-/// size of a friction or drive parameter: the larger of its two compared values, including the error bar.
-pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], size_of_term: &dyn Fn(&TorqueTerm) -> f64) -> Parts {
+/// The parts of a robot with their effects on the base parameters with the indices `rows`. `values` contains the size of
+/// each of these base parameters: its absolute value plus its error bar, and of two compared results the larger one. A
+/// term that belongs to a base parameter with others, such as the drive inertia of the first joint with the inertia of
+/// the first link, has at most the value of this parameter.
+pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], values: &[f64]) -> Parts {
     let effects = effects(base).select_rows(rows);
+    let largest_value = |column: usize| {
+        let of_column = effects.column(column);
+        let ratios = of_column.iter().zip(values).filter(|(effect, _)| **effect != 0.0);
+        ratios.map(|(effect, value)| value / effect.abs()).reduce(f64::min).unwrap_or(0.0)
+    };
     let total: f64 = model.inertials().iter().map(InertialParameters::mass_kg).sum();
     let mut found = Parts::default();
     let columns = base.all_columns();
@@ -77,7 +89,7 @@ pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], size_of_term:
         (0..columns.len()).filter(|&k| is_wanted(&columns[k])).collect::<Vec<_>>()
     };
     let size = |column: usize| match &columns[column] {
-        Column::Term(term) => TERM_SHARE * size_of_term(term),
+        Column::Term(_) => TERM_SHARE * largest_value(column),
         Column::Body { body, parameter } => {
             let [mass, length] = expected_change(model, *body, total);
             match parameter {

@@ -1,10 +1,11 @@
 //! Correction for explanations in which a body would have a negative mass.
 
-use super::description::DescriptionDifferences;
+use super::differences::Differences;
+use super::parts::Part;
 use dynident_estimation::changes::Explanation;
 use dynident_estimation::normal_below;
 
-impl DescriptionDifferences {
+impl Differences {
     /// Conditions the probabilities on positive masses of the bodies that an explanation names. The changes are assumed
     /// normally distributed, which does not exclude that a body of 0.3 kg loses 1 kg. With the condition that the mass
     /// m of each of these bodies is positive, the evidence of explanation e is multiplied by
@@ -24,7 +25,7 @@ impl DescriptionDifferences {
     fn positive_factor(&self, explanation: &Explanation, nominal: &[f64]) -> f64 {
         let of_body = |body: usize| {
             let (change, covariance) = self.change_of(explanation, body);
-            let groups = explanation.groups.iter().filter(|&&group| self.bodies[group] == body);
+            let groups = explanation.groups.iter().filter(|&&group| self.parts[group] == Part::Body(body));
             let expected: f64 = groups.map(|&group| self.unknowns[group].row(0).norm_squared()).sum();
             let mass = nominal[10 * body].max(0.0);
             let before = positive(mass, explanation.scale.powi(2) * expected);

@@ -1,7 +1,7 @@
 //! The exported model if few bodies differ from the description, and its torque error after single bodies are edited.
 
 use super::average::BodyUncertainty;
-use super::description::{DescriptionDifferences, SPREADS};
+use super::differences::Differences;
 use super::parts::effects;
 use crate::consistent::{ConsistencySettings, consistent_body};
 use crate::thresholds::DescriptionThresholds;
@@ -36,7 +36,7 @@ pub struct RestoredBody {
 /// Prior knowledge for the exported model according to `explanation`. The changed bodies get the mean of the change;
 /// the others keep the values of the description, with the uncertainty of the explanation.
 pub(crate) fn knowledge_of(
-    differences: &DescriptionDifferences,
+    differences: &Differences,
     explanation: &Explanation,
     robot: &ParametricModel,
     knowledge: &ConsistencySettings,
@@ -49,7 +49,7 @@ pub(crate) fn knowledge_of(
         if named.contains(&index) {
             settings.prior = Some(changed_body(own, &differences.change_of(explanation, index).0));
         } else if differences.body_probability(index, limits) < MAX_UNCHANGED_PROBABILITY {
-            settings.prior_std = Some(SPREADS[explanation.covariance].largest());
+            settings.prior_std = Some(differences.sizes[explanation.covariance].largest());
         }
     }
     found
@@ -83,7 +83,7 @@ fn changed_body(nominal: &[f64], change: &DVector<f64>) -> [f64; 10] {
 /// form of normal variables is at most 1.96² times its mean (Szekely and Bakirov, Probability Theory and Related Fields
 /// 126 (2003) 184).
 pub(crate) fn restored_errors(
-    differences: &DescriptionDifferences,
+    differences: &Differences,
     uncertainty: &BodyUncertainty,
     robot: &ParametricModel,
     problem: &LinearProblem,

@@ -4,7 +4,7 @@ use super::problem::{MASS_STD_RATIO, consistent_body, reference_bodies, term_siz
 use super::settings::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
-use dynident_model::{Body, INERTIAL_NAMES, InertialParameters};
+use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, Matrix4};
 
 /// Standard deviation of a friction or drive parameter, relative to the value with which the term alone would explain
@@ -58,13 +58,11 @@ pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySet
 /// Changes of all inertial parameters for independent errors with a relative standard deviation of 1, eleven for each
 /// body. Ten are the directions of [`nominal_covariance`] divided by its 30 %. The eleventh is the distance of the
 /// centre of mass from the joint: links are nearly symmetric about their length, but the position of a motor along the
-/// link may be wrong by a large part of its size. `None` if the description of a body is missing or inconsistent.
+/// link may be wrong by a large part of its size. `None` if the nominal values of a body
+/// are inconsistent.
 pub(crate) fn body_spread(robot: &ParametricModel, settings: &ConsistencySettings) -> Option<DMatrix<f64>> {
     let bodies = robot.model().bodies();
-    let is_described = |(index, body): (usize, &Body)| {
-        body.prior().is_some() && consistent_body(&robot.nominal()[10 * index..10 * index + 10]).0
-    };
-    if !bodies.iter().enumerate().all(is_described) {
+    if !robot.nominal()[..10 * bodies.len()].chunks_exact(10).all(|body| consistent_body(body).0) {
         return None;
     }
     let mut spread = DMatrix::zeros(10 * bodies.len(), 11 * bodies.len());

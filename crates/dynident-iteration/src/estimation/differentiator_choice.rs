@@ -1,7 +1,8 @@
-//! Selection of the differentiator of a run.
+//! Selection of the differentiator (method that computes velocity and acceleration from position) of a run.
 //!
-//! All candidates yield rows for the same torques, so the best one has the smallest residual: noise of velocities and
-//! accelerations, motion that a filter removes, and a wrong map all increase the residual.
+//! All candidate differentiators yield regressor rows for the same torques, so the best one has the smallest
+//! residual. Noise of velocities and accelerations, motion that a filter removes, and a wrong map from position to
+//! velocity all increase the residual.
 
 use crate::estimation::run_logs::{RunLog, identification_settings, recordings};
 use crate::setup::error::IterationError;
@@ -17,9 +18,11 @@ use std::sync::Arc;
 /// Smallest relative reduction of the residual for which a later candidate is preferred; smaller differences occur by
 /// chance in some thousand rows.
 const MIN_RESIDUAL_REDUCTION: f64 = 0.02;
-/// Smallest share of the usable samples of another candidate; a candidate with fewer samples is excluded.
+/// Minimum number of usable samples, as a share of those of another candidate; a candidate with fewer samples is
+/// excluded.
 const MIN_SAMPLES_SHARE: f64 = 0.5;
-/// Largest lag in the search of the paper's map and the time warp, s.
+/// Largest lag in the searches of the logistic map from position (*Iterative Identification of Robot Dynamic
+/// Parameters Based on Logistic Function*, Eqs. 15, 16) and of the time warp, s.
 const MAX_LAG_S: f64 = 0.5;
 
 /// The selected differentiator and the other candidates.
@@ -34,7 +37,7 @@ pub struct DifferentiatorChoice {
     pub candidates: Vec<DifferentiatorCandidate>,
 }
 
-/// A candidate.
+/// One candidate for the differentiator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DifferentiatorCandidate {
@@ -42,10 +45,11 @@ pub struct DifferentiatorCandidate {
     pub name: String,
     /// Number of usable samples.
     pub samples: usize,
-    /// Ratio of its residual to that of the selected one, on the samples that are usable for all: geometric mean, over
-    /// the rows of all joints, of the standard deviations. `None` if it was not fitted.
+    /// Ratio of this candidate's residual to that of the selected one, on the samples that all candidates can use.
+    /// The residual is the geometric mean, over the rows of all joints, of the standard deviations. `None` if the
+    /// candidate was not fitted.
     pub residual_ratio: Option<f64>,
-    /// Why it was not fitted.
+    /// Why the candidate was not fitted.
     pub problem: Option<String>,
 }
 
@@ -79,7 +83,7 @@ fn candidates() -> [(&'static str, DifferentiatorSettings); 4] {
 }
 
 /// Selects the differentiator with the smallest torque residual of a run. Friction is selected for each candidate if
-/// the settings request it.
+/// the settings request friction selection.
 ///
 /// # Errors
 /// A run to which no candidate can be applied.
@@ -88,7 +92,7 @@ pub(crate) fn choose_differentiator(
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<DifferentiatorChoice, IterationError> {
-    // The motion of the run by each candidate.
+    // The motion of the run as computed by each candidate.
     let mut tried: Vec<(DifferentiatorCandidate, DifferentiatorSettings, Vec<Recording>)> = Vec::new();
     let mut last_error = None;
     for (name, way) in candidates() {
@@ -154,7 +158,7 @@ fn usable(recording: &Recording) -> usize {
     }
 }
 
-/// The samples of a recording that all candidates can use, and the torques that any of them excludes.
+/// The samples of a recording that all candidates can use, and the torques that at least one candidate excludes.
 #[derive(Clone, Default)]
 struct CommonSamples {
     usable: Vec<bool>,
@@ -191,7 +195,7 @@ fn restrict(motions: &mut [Recording], masks: &[CommonSamples]) {
     }
 }
 
-/// Mean over the rows of the logarithm of their joint's residual standard deviation.
+/// Mean, over all rows, of the logarithm of the residual standard deviation of the row's joint.
 fn residual(
     task: &IterationTask,
     motions: &[Recording],

@@ -24,48 +24,49 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunEstimate {
-    /// Base parameters.
+    /// Estimated values of the base parameters.
     pub values: Vec<f64>,
-    /// Their standard deviations; zero for parameters that were given or that the data do not determine.
+    /// Standard deviations of the values; zero for parameters that were given or that the data do not determine.
     pub std: Vec<f64>,
-    /// Their covariance, by rows.
+    /// Covariance of the values, by rows.
     pub covariance: Vec<Vec<f64>>,
     /// Number of rows in the fit.
     pub rows: usize,
     /// Standard deviation of each joint's residual, Nm (N).
     pub joint_sigma: Vec<f64>,
-    /// Indices of the base parameters that the data do not determine; they have the nominal values.
+    /// Indices of the base parameters that the data do not determine; their values are nominal.
     pub fixed: Vec<usize>,
     /// All parameters of the best physically consistent model, ten per body and one per term, if requested.
     pub possible: Option<Vec<f64>>,
     /// Why no physically consistent model was found; `None` if one was found or not requested.
     pub impossible: Option<String>,
-    /// The friction that this run selected for itself and later runs; empty if it was stated or selected before.
+    /// Friction laws that were selected from this run, for it and all later runs. Empty if the study gives the
+    /// friction laws or an earlier run selected them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
     /// Lag of each joint's torque behind the motion, including the compensated part; `None` if the rows do not
-    /// determine it. Empty in the joint-by-joint scheme.
+    /// determine it. Empty if joints are identified one by one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
     /// The compensated lag and the lag that all joints share.
     #[serde(default)]
     pub lag: LagChoice,
-    /// The selected differentiator; `None` if it was stated.
+    /// The selected differentiator; `None` if the settings define it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
-    /// Joints whose dry friction rows near rest are excluded, because these rows increase the residual; one entry per
-    /// joint. Empty if no rows are excluded, and for runs that are fitted together.
+    /// For each joint with dry friction, the excluded rows near zero velocity, if these rows increase the residual;
+    /// `None` for other joints. Empty if no rows are excluded, and for runs that are fitted together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub near_rest: Vec<Option<SamplesNearRest>>,
-    /// Deviation of each run's torque offset from the mean, if runs that are fitted together have separate offsets; the
-    /// base parameters contain the mean. Empty if they share an offset.
+    /// Deviation of each run's torque offset from the mean, if runs that are fitted together have separate offsets;
+    /// the base parameters contain the mean. Empty if all runs share one offset.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub run_offsets: Vec<RunOffset>,
 }
 
 impl RunEstimate {
-    /// Returns the model parameters for a controller: the physically consistent model if requested, else the base
-    /// parameters. `None` if the physically consistent model was requested and not found.
+    /// Returns the model parameters for a controller: the physically consistent model if requested, otherwise the
+    /// base parameters. `None` if the physically consistent model was requested and not found.
     pub fn for_controller(&self) -> Option<ModelParameters> {
         match (&self.possible, &self.impossible) {
             (Some(parameters), _) => Some(ModelParameters::All(parameters.clone())),
@@ -74,16 +75,16 @@ impl RunEstimate {
         }
     }
 
-    /// Returns the distance from rest above which the rows of each joint are used; empty if only rows at rest are
-    /// excluded.
+    /// Returns the distance from rest (zero velocity) above which the rows of each joint are used; empty if only rows
+    /// at rest are excluded.
     pub fn rest_margins(&self) -> Vec<StictionBand> {
         let margin =
             |near_rest: &Option<SamplesNearRest>| near_rest.as_ref().map(|found| found.margin).unwrap_or_default();
         self.near_rest.iter().map(margin).collect()
     }
 
-    /// Geometric mean of the ratio of its error bars to another's, over the parameters that both determine; 1
-    /// without such parameters.
+    /// Geometric mean of the ratio of this estimate's error bars to those of the other, over the parameters that both
+    /// determine; 1 if there are none.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
         let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
         let (sum, count) =
@@ -92,10 +93,10 @@ impl RunEstimate {
     }
 }
 
-/// Identifies several runs together, as [`identify_run`](crate::identify_run) does for one. Each run is
-/// weighted by its own noise, joint by joint ([`LogNoise::Own`](dynident_identification::LogNoise::Own)), so a run with
-/// poor tracking has less weight. Residuals are those of the last run; delays are those of all runs. If the offset of a
-/// run differs from the others, each run gets its own offset ([`RunOffsets`](crate::RunOffsets)).
+/// Identifies several runs together, as [`identify_run`](crate::identify_run) does for one run. Each run is weighted
+/// by its own noise, joint by joint ([`LogNoise::Own`](dynident_identification::LogNoise::Own)), so that a run with
+/// poor tracking has less weight. Residuals are those of the last run; delays are those of all runs. If the offset of
+/// a run differs from the others, each run gets its own offset ([`RunOffsets`](crate::RunOffsets)).
 ///
 /// # Errors
 /// As [`identify_run`](crate::identify_run).
@@ -118,12 +119,12 @@ pub fn identify_runs(
     }
 }
 
-/// Fits with a shared offset per joint, or one per run.
+/// Fits the runs with one shared offset per joint, or with one offset per joint and run.
 ///
-/// Friction that is selected from rows with a lag can compensate the lag, differently at each joint, so that the common
-/// lag becomes insignificant. Therefore, if friction was selected and no lag was compensated, the fit is repeated with
-/// the lag of the stated friction, whatever its error bar, and the fit with the smaller Bayesian information criterion
-/// ([`bic`]) is kept.
+/// If the rows contain a lag, the selected friction can compensate it, differently at each joint, so that the common
+/// lag becomes insignificant. Therefore, if friction was selected and no lag was compensated, the fit is repeated
+/// with the lag that is estimated with the given friction, independent of its error bar. The fit with the smaller
+/// Bayesian information criterion ([`bic`]) is kept.
 fn fitted(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -147,7 +148,7 @@ fn fitted(
         return Ok(found.estimate);
     };
     let first = LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; task.robot.dof()], ..LagChoice::default() };
-    // If that fit fails, the first one is kept.
+    // If the repeated fit fails, the first fit is kept.
     let other = fit.rounds(&identification, LagRounds::of(identification.lags).after(first));
     Ok(other.ok().filter(|other| other.bic < found.bic).unwrap_or(found).estimate)
 }
@@ -205,7 +206,7 @@ impl RunsFit<'_> {
     }
 }
 
-/// Row weights of each recording and joint: noise of the last run over noise of the recording's run.
+/// Row weights of each recording and joint: noise of the last run divided by noise of the recording's run.
 fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
     let sigma = |log: &RunLog<'_>, joint: usize| log.joint_sigma.get(joint).copied().filter(|sigma| *sigma > 0.0);
     let of_run = |log: &RunLog<'_>| -> Vec<f64> {
@@ -250,7 +251,7 @@ fn all_joints(
     })
 }
 
-/// The paper's order: each joint from its own rows, from tip to base.
+/// Identifies each joint from its own rows, from tip to base.
 fn joint_by_joint(
     task: &IterationTask,
     logs: &Logs<'_>,
@@ -287,7 +288,7 @@ fn joint_by_joint(
     })
 }
 
-/// All parameters of the best physically consistent model, or why it was not found.
+/// All parameters of the best physically consistent model, or the reason why it was not found.
 fn consistent(
     robot: &ParametricModel,
     problem: &LinearProblem,

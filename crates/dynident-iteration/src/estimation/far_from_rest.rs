@@ -1,10 +1,10 @@
-//! Exclusion of rows near rest, joint by joint, if they increase the residual.
+//! Exclusion of rows near rest (zero velocity), joint by joint, if they increase the residual.
 //!
-//! Near rest a joint with dry friction sticks, breaks loose and jumps, but its smoothed motion does not. The difference
-//! has the same sign in every run, so more rows narrow the error bars but do not reduce the error: it biases drive
-//! inertias and looks like a lag of individual joints. Where this happens, rows near rest have larger residuals than
-//! the others. So a run is fitted with and without these rows, and they are excluded for the joints whose residual they
-//! increase.
+//! Near rest a joint with dry friction sticks, breaks loose and jumps, but its smoothed motion does not. The
+//! difference has the same sign in every run, so more rows narrow the error bars without reducing the error. It
+//! biases drive inertias and looks like a lag of individual joints. Rows near rest then have larger residuals than
+//! other rows. A run is therefore fitted with and without these rows; they are excluded for the joints whose residual
+//! they increase.
 
 use crate::estimation::estimate::{RunEstimate, identify_runs};
 use crate::estimation::run_logs::{RunLog, recordings};
@@ -18,8 +18,8 @@ use dynident_identification::friction::chosen_model;
 use dynident_identification::{Recording, RegressorModel, Samples};
 use dynident_simulation::Record;
 
-/// Candidate margins, widest first: a slowly accelerating joint sticks up to a fifth of its speed, and the smoothed
-/// breakaway lasts one period of the smoother's cut-off.
+/// Candidate margins around rest, widest first. A slowly accelerating joint sticks up to a fifth of its speed, and
+/// the smoothed breakaway lasts one period of the smoother's cut-off frequency.
 const MARGINS: [StictionBand; 4] = [
     StictionBand { speed_share: 0.2, smoothing_periods: 1.0 },
     StictionBand { speed_share: 0.1, smoothing_periods: 1.0 },
@@ -27,12 +27,13 @@ const MARGINS: [StictionBand; 4] = [
     StictionBand { speed_share: 0.1, smoothing_periods: 0.5 },
 ];
 
-/// Smallest share of a run's samples that a margin leaves a joint; otherwise its friction near rest would not be
+/// Minimum share of a run's samples that must remain for a joint; otherwise its friction near rest would not be
 /// determined.
 const MIN_SAMPLES_SHARE: f64 = 0.5;
 
-/// Smallest ratio of the residuals with and without rows near rest for which the rows are excluded. By chance the ratio
-/// varies by some percent if a third of some hundred rows is excluded; a false exclusion only widens the error bars.
+/// Rows near rest are excluded if the ratio of the residuals with and without them exceeds this. If a third of some
+/// hundred rows is excluded, the ratio varies by some percent by chance. A wrong exclusion only widens the error
+/// bars.
 const MIN_RESIDUAL_RATIO: f64 = 1.05;
 
 /// Estimates the base parameters from a run, without rows near rest where friction does not explain them.
@@ -49,7 +50,7 @@ pub(crate) fn without_near_rest(
         return Ok(all);
     }
     let (widest, shares) = run.widest_margins()?;
-    // If the remaining rows cannot be fitted, none are excluded.
+    // If the remaining rows cannot be fitted, no rows are excluded.
     let Some(far) = run.identified(&widest).ok().filter(|far| far.impossible.is_none()) else { return Ok(all) };
     let is_excluded = |joint: usize| {
         let (near, far) = (all.joint_sigma[joint], far.joint_sigma[joint]);
@@ -85,7 +86,8 @@ impl OneRun<'_> {
         RunLog { run: 1, legs, records, joint_sigma: &[], differentiator: None, rest_margins }
     }
 
-    /// The estimate with these margins. Friction that needs rows near rest is not selected without them.
+    /// The estimate with these margins around rest. Friction laws that need rows near rest are not selected without
+    /// them.
     fn identified(&self, rest_margins: &[StictionBand]) -> Result<RunEstimate, IterationError> {
         let mut settings = self.settings.clone();
         settings.friction = settings.friction.with_searches(|mut search| {
@@ -97,8 +99,8 @@ impl OneRun<'_> {
         identify_runs(self.task, &[self.log(rest_margins)], &settings)
     }
 
-    /// The widest margin that leaves each joint enough samples (for a joint without dry friction: samples at rest
-    /// only), and the share of the samples that it excludes.
+    /// The widest margins around rest with which enough samples of each joint remain (for a joint without dry
+    /// friction only samples at rest are excluded), and the share of the samples that they exclude.
     fn widest_margins(&self) -> Result<(Vec<StictionBand>, Vec<f64>), IterationError> {
         let dry = has_dry_friction(&self.task.robot, self.settings.friction.searches());
         let count = |margin: StictionBand| -> Result<Vec<f64>, IterationError> {

@@ -4,20 +4,21 @@ use serde::{Deserialize, Serialize};
 
 const MAX_DIRECTIONS: usize = 10;
 
-/// Forecast for a motion from the estimate before it.
+/// Forecast for the motion of a run, from the estimate before the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MotionForecast {
     /// Whether the motion differs from that of the previous good run.
     pub redesigned: bool,
-    /// Why the motion was not changed, if a new one was searched.
+    /// Why the motion was not changed, if a new motion was searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Forecast reduction of the error bars of the worst directions (root mean square), percent.
+    /// Forecast reduction of the error bars along the directions with the widest error bars (root mean square),
+    /// percent.
     pub gain_percent: f64,
-    /// Forecast reduction if the motion of the previous good run is repeated, percent.
+    /// The same forecast reduction if the motion of the previous good run is repeated, percent.
     pub repeat_gain_percent: f64,
-    /// Whether the reduction reaches the minimum in the settings.
+    /// Whether the forecast reduction reaches the minimum in the settings.
     pub worth_a_run: bool,
     /// The directions with the widest error bars before the run, widest first.
     pub directions: Vec<ForecastDirection>,
@@ -32,17 +33,17 @@ pub struct MotionForecast {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ForecastDirection {
-    /// v, one number per base parameter, in 1 over its unit.
+    /// Weights v, one number per base parameter; the unit is the reciprocal of the parameter's unit.
     pub weights: Vec<f64>,
-    /// `√(vᵀ C v)` with the covariance before the run: the torque error over the workspace (root mean square, all
-    /// joints), in units of the torque noise.
+    /// Error bar `√(vᵀ C v)` before the run, with the covariance C: the torque error that it causes over the
+    /// workspace (root mean square, all joints), in units of the torque noise.
     pub before: f64,
-    /// Forecast after the run.
+    /// Forecast of this error bar after the run.
     pub after: f64,
 }
 
 impl MotionForecast {
-    /// Returns the reduction of the error bars of the directions (root mean square) that was reached, percent, from the
+    /// Returns the actual reduction of the error bars along the directions (root mean square), percent, from the
     /// estimate after the run; `None` if there is nothing to compare.
     pub fn reached_gain_percent(&self, known: &RunEstimate) -> Option<f64> {
         let covariance = covariance(known);
@@ -56,25 +57,25 @@ impl MotionForecast {
     }
 }
 
-/// Information of all good runs, and the units of parameter errors.
+/// Information of all good runs, and the units in which parameter errors are measured.
 #[derive(Clone, Debug)]
 pub(crate) struct KnownInformation {
-    /// Sum over the good runs.
+    /// Sum of the information matrices of the good runs.
     pub(crate) total: DMatrix<f64>,
-    /// T with `T Tᵀ = M⁻¹`: its columns are parameter steps that cause as much torque as the joint noise, over the
-    /// workspace.
+    /// Matrix T with `T Tᵀ = M⁻¹`: each column is a parameter step that causes as much torque as the joint noise,
+    /// over the workspace.
     pub(crate) units: DMatrix<f64>,
     /// `T⁻ᵀ`.
     weights: DMatrix<f64>,
 }
 
 impl KnownInformation {
-    /// `needed` is M, the mean information of a sample over the workspace.
+    /// `needed` is M, the mean information matrix of one sample over the workspace.
     pub(crate) fn new(total: DMatrix<f64>, needed: &DMatrix<f64>) -> Self {
         let count = total.nrows();
         let scale: Vec<f64> = needed.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
         let eigen = SymmetricEigen::new(DMatrix::from_fn(count, count, |i, j| needed[(i, j)] / (scale[i] * scale[j])));
-        // Directions without any torque get the smallest positive unit.
+        // Directions that cause no torque get the smallest positive unit.
         let least = f64::EPSILON.sqrt() * eigen.eigenvalues.amax();
         let root = eigen.eigenvalues.map(|value| value.max(least).sqrt());
         let vectors = eigen.eigenvectors;
@@ -86,13 +87,14 @@ impl KnownInformation {
     /// `Tᵀ D T`.
     fn measured(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
         let measured = self.units.tr_mul(information) * &self.units;
-        // Exactly symmetric, as required by the eigenvalue solver.
+        // Made exactly symmetric, as the eigenvalue solver requires.
         0.5 * (&measured + measured.transpose())
     }
 
-    /// Forecast of a run: the worst directions with their error bars before and after it, and the standard deviations
-    /// after it. The error bars before the run are those of the estimate, whose covariance includes correlated
-    /// residuals; the run scales them by the ratio from information alone.
+    /// Forecast of a run: the directions with the widest error bars before it, with their error bars before and after
+    /// it, and the standard deviations of the parameters after it. The error bars before the run are those of the
+    /// estimate, whose covariance includes correlated residuals. The forecast multiplies them by the ratio that
+    /// follows from the information matrices.
     pub(crate) fn after(&self, run: &DMatrix<f64>, known: &RunEstimate) -> Expected {
         let count = self.total.nrows();
         let (before, after) =
@@ -124,7 +126,7 @@ impl KnownInformation {
 
 pub(crate) struct Expected {
     pub(crate) directions: Vec<ForecastDirection>,
-    /// Error bars before and after by information alone, direction by direction.
+    /// Error bars before and after the run from the information matrices alone, direction by direction.
     bars: Vec<(f64, f64)>,
     pub(crate) std: Vec<Option<f64>>,
 }
@@ -141,7 +143,7 @@ fn gain_percent(bars: &[(f64, f64)]) -> Option<f64> {
     (sums[0] > 0.0).then(|| 100.0 * (1.0 - (sums[1] / sums[0]).sqrt()))
 }
 
-/// `√(vᵀ C v)`.
+/// Standard deviation `√(vᵀ C v)` of the combination with weights v.
 fn bar(covariance: &DMatrix<f64>, weights: &DVector<f64>) -> f64 {
     (covariance * weights).dot(weights).max(0.0).sqrt()
 }
@@ -174,7 +176,7 @@ impl Inverse {
         shares.iter().zip(&self.values).map(|(share, value)| share * share / value).sum()
     }
 
-    /// Whether a direction has no component in the null space.
+    /// Whether a direction has no component in the null space, so that the data determine it.
     fn determines(&self, direction: &DVector<f64>) -> bool {
         let most = f64::EPSILON.sqrt() * direction.norm_squared();
         let lost = self.values.iter().enumerate().filter(|(_, value)| **value <= self.least);

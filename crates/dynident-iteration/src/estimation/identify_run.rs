@@ -6,10 +6,10 @@ use crate::setup::leg::IterationTask;
 use crate::setup::settings::RunIdentificationSettings;
 use dynident_simulation::Record;
 
-/// Estimates the base parameters from the records of one run (one record per leg of the task), with the same
-/// identification as for any log ([`dynident_identification`]). Only rows inside the windows are used; joints without
-/// rows are omitted; known columns are fixed. The differentiator is selected if the settings request it, and rows near
-/// rest are used where friction explains them ([`SamplesNearRest`](crate::SamplesNearRest)).
+/// Estimates the base parameters from the records of one run (one record per trajectory of the task), with the same
+/// identification as for any log ([`dynident_identification`]). Only rows inside the time windows are used; joints
+/// without rows are omitted; known columns are fixed. The differentiator is selected if the settings request it. Rows
+/// near rest are excluded for joints whose residual they increase ([`SamplesNearRest`](crate::SamplesNearRest)).
 ///
 /// # Errors
 /// Records that do not belong to the task, a differentiator that cannot be applied, rows that are not sufficient for an

@@ -1,9 +1,10 @@
 //! Detection of a link length that differs from the robot description.
 //!
-//! The size of the residual does not reveal a wrong length, because unmodelled friction causes a similar residual. But
-//! only a wrong length is corrected by fitting another length. So the runs are fitted again with one length changed by
-//! ±[`LENGTH_STEP`]. `Σ_j n_j σ_j(s)² / σ_j(0)²`, the squared residuals relative to those of the described lengths, is
-//! a parabola in the change s; the runs are fitted again at its minimum.
+//! The size of the residual does not reveal a wrong length, because unmodelled friction causes a similar residual.
+//! But only for a wrong length does another length reduce the residual. So the runs are fitted again with one length
+//! changed by ±[`LENGTH_STEP`]. The sum of squared residuals relative to those of the lengths in the description,
+//! `Σ_j n_j σ_j(s)² / σ_j(0)²` with n_j rows of joint j, is a parabola in the change s. The runs are fitted again at
+//! its minimum.
 
 use crate::estimation::estimate::RunEstimate;
 use crate::estimation::run_logs::{RunLog, identification_settings, recordings};
@@ -20,7 +21,8 @@ use serde::{Deserialize, Serialize};
 const LENGTH_STEP: f64 = 0.03;
 /// Largest relative change for which the parabola is used.
 const MAX_LENGTH_CHANGE: f64 = 0.3;
-/// Smallest offset that is tested, as a share of the longest; shorter offsets have too little effect on the torque.
+/// Minimum joint offset that is tested, as a share of the longest offset; shorter offsets have too little effect on
+/// the torque.
 const MIN_OFFSET_SHARE: f64 = 0.02;
 
 /// A link length that differs from the robot description, estimated from the torque.
@@ -29,18 +31,19 @@ const MIN_OFFSET_SHARE: f64 = 0.02;
 pub struct OtherLength {
     /// The joint whose distance from the previous joint differs; `None` if all lengths differ by the same factor.
     pub joint: Option<String>,
-    /// Ratio of the estimated to the described length.
+    /// Ratio of the estimated length to the length in the robot description.
     pub factor: f64,
     /// The joint whose residual decreases most.
     pub explained_joint: String,
-    /// Residual of that joint with the described length, Nm (N), standard deviation.
+    /// Residual of that joint with the lengths of the robot description, Nm (N), standard deviation.
     pub left_nm: f64,
     /// Residual of that joint with the estimated length, Nm (N).
     pub left_with_nm: f64,
 }
 
-/// Returns the change of one length, or of all lengths by the same factor, that explains the torque of some runs best,
-/// if it does so significantly. `task` includes the selected friction; `known` is the estimate of the runs.
+/// Returns the change of one length, or of all lengths by the same factor, that explains the torque of some runs
+/// best, if the improvement is significant. `task` includes the selected friction; `known` is the estimate of the
+/// runs.
 pub(crate) fn other_length(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -68,8 +71,8 @@ pub(crate) fn other_length(
     let as_described = misfit(&described);
     let length = |joint: usize| model.joints()[joint].placement.translation.norm();
     let longest = (0..model.dof()).map(length).fold(0.0, f64::max);
-    // The first joint's distance from the base has no effect on the torque. With a single length, changing all lengths
-    // is the same change.
+    // The first joint's distance from the base has no effect on the torque. If there is only one other length,
+    // changing it is the same as changing all lengths.
     let long: Vec<usize> = (1..model.dof()).filter(|&joint| length(joint) > MIN_OFFSET_SHARE * longest).collect();
     let all = (long.len() > 1).then_some(None);
     let mut best: Option<(f64, OtherLength)> = None;
@@ -103,12 +106,12 @@ pub(crate) fn other_length(
 }
 
 struct Residuals {
-    /// σ_j, Nm (N); zero for a joint without rows.
+    /// Residual σ_j of each joint, Nm (N); zero for a joint without rows.
     sigma: Vec<f64>,
     rows: Vec<usize>,
 }
 
-/// Residuals with one length, or all, changed by a factor of `1 + change`.
+/// Residuals with one length, or all lengths, multiplied by `1 + change`.
 fn residuals_with(
     task: &IterationTask,
     motions: &[Recording],

@@ -1,4 +1,4 @@
-//! From logs of runs to parameters and a forecast.
+//! Parameters and forecasts from the logs of runs.
 
 pub(crate) mod differentiator_choice;
 pub(crate) mod estimate;

@@ -16,21 +16,21 @@ use std::sync::Arc;
 pub struct RunLog<'a> {
     /// Number of the run, from 1.
     pub run: usize,
-    /// Its legs.
+    /// Trajectories of the run.
     pub legs: &'a [Leg],
-    /// One record per leg.
+    /// One record per trajectory.
     pub records: &'a [Record],
-    /// Standard deviation of each joint's residual in the run alone, Nm (N); used as weights in joint-by-joint
-    /// identification.
+    /// Standard deviation of each joint's residual in this run alone, Nm (N); the weights if joints are identified
+    /// one by one.
     pub joint_sigma: &'a [f64],
-    /// The differentiator that the run selected; `None` for that of the settings.
+    /// The differentiator that was selected for the run; `None` for that of the settings.
     pub differentiator: Option<&'a DifferentiatorSettings>,
-    /// Distance from rest above which the torque of each joint with dry friction is used, as selected by the run;
-    /// without an entry, only samples at rest are excluded.
+    /// Distance from rest above which the torque of each joint with dry friction is used, as selected for the run.
+    /// Without an entry only samples at rest are excluded.
     pub rest_margins: &'a [StictionBand],
 }
 
-/// The records as recordings with computed motions, run by run and leg by leg.
+/// The records as recordings with computed motions, run by run and trajectory by trajectory.
 pub(crate) fn recordings(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -69,12 +69,12 @@ pub(crate) fn identification_settings(
     identification.estimation = settings.estimation.clone();
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
-    // Poorly determined friction would prevent convergence.
+    // Friction that is poorly determined would prevent convergence.
     identification.friction = settings.friction.clone().with_searches(|own| FrictionSearch {
         most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),
         ..own
     });
-    // With the same controller, friction causes another apparent lag at each joint and in each run.
+    // With the same controller, friction causes a different apparent lag at each joint and in each run.
     identification.lags = LagCandidates::Common;
     identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
     identification

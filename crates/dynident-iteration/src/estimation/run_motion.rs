@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Trajectories of a run, leg by leg, which replace those of the task. `run.json` contains their rates; the samples are
-/// in `motion.csv` next to it (`motion_2.csv` and so on for further legs).
+/// Trajectories of a run that replace those of the task. `run.json` contains their sampling rates; the samples are in
+/// `motion.csv` next to it (`motion_2.csv` and so on for further trajectories).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunMotion {
-    /// Sample rate of each leg, Hz.
+    /// Sampling rate of each trajectory, Hz.
     pub rates_hz: Vec<f64>,
     /// The trajectories.
     #[serde(skip)]
@@ -31,8 +31,8 @@ impl RunMotion {
         Self { rates_hz: references.iter().map(Reference::rate_hz).collect(), references }
     }
 
-    /// Names and contents of the tables: columns `t_s`, `q1..`, `dq1..`, `ddq1..`; s, rad (m). They are read back bit
-    /// for bit.
+    /// Names and contents of the tables: columns `t_s`, `q1..`, `dq1..`, `ddq1..`; s, rad (m). Reading them gives
+    /// bit-identical numbers.
     pub(crate) fn tables(&self) -> impl Iterator<Item = (String, String)> {
         self.references.iter().enumerate().map(|(leg, reference)| (table_name(leg), trajectory_csv(reference, None)))
     }
@@ -45,7 +45,7 @@ impl RunMotion {
     }
 }
 
-/// The legs of a run: those of the task, or along the run's own trajectories.
+/// The trajectories of a run: those of the task, or the run's own.
 ///
 /// # Errors
 /// A motion with another number of legs.

@@ -6,8 +6,9 @@ use dynident_identification::OffsetChoice;
 use dynident_model::terms::TorqueTerm;
 use serde::{Deserialize, Serialize};
 
-/// Deviation of a run's offset in standard deviations above which it is significant: among a hundred runs with the same
-/// offset, it is exceeded by chance in less than one of a thousand fits, also if the error bars come from few segments.
+/// Deviation of a run's offset, in standard deviations, above which it is significant. Among a hundred runs with the
+/// same offset it is exceeded by chance in less than one of a thousand fits, even if the error bars come from few
+/// time segments.
 const MIN_DEVIATION_SIGMAS: f64 = 5.0;
 
 /// Smallest relevant deviation as a share of the joint's torque (root mean square).
@@ -17,19 +18,19 @@ const MIN_DEVIATION_SHARE: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunOffset {
-    /// The run.
+    /// Number of the run.
     pub run: usize,
     /// Index of the joint, from 0.
     pub joint: usize,
-    /// The deviation, Nm (N).
+    /// Deviation from the mean, Nm (N).
     pub deviation: f64,
-    /// Its standard deviation, Nm (N).
+    /// Standard deviation of the deviation, Nm (N).
     pub std: f64,
 }
 
 pub(crate) fn choices(robot: &ParametricModel, runs: &[RunLog<'_>], asked: RunOffsets) -> &'static [OffsetChoice] {
     let has_offset = robot.terms().iter().any(|term| matches!(term, TorqueTerm::Offset(_)));
-    // With several legs each would need its own offset, but joints at rest do not determine it.
+    // With several trajectories, each would need its own offset, but joints at rest do not determine it.
     let possible = has_offset && runs.len() > 1 && runs.iter().all(|run| run.legs.len() == 1);
     match asked {
         RunOffsets::WhereSeen if possible => &[OffsetChoice::Shared, OffsetChoice::PerLog],
@@ -38,8 +39,8 @@ pub(crate) fn choices(robot: &ParametricModel, runs: &[RunLog<'_>], asked: RunOf
     }
 }
 
-/// The deviations in an estimate with an offset per run; `columns` are (index of the run, joint, column). The deviation
-/// of the last run is minus the sum of the others.
+/// The deviations in an estimate with an offset per run; `columns` contains (index of the run, joint, column). The
+/// deviation of the last run is minus the sum of the other deviations.
 pub(crate) fn deviations(
     columns: &[(usize, usize, usize)],
     estimate: &Estimate,

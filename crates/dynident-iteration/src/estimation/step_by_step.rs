@@ -1,5 +1,6 @@
-//! The paper's order: the tip joint first, then each joint towards the base, with the torque of known parameters
-//! subtracted.
+//! Identification joint by joint: the tip joint first, then each joint towards the base, with the torque of known
+//! parameters subtracted (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Eqs. 9,
+//! 10).
 
 use crate::setup::error::IterationError;
 use crate::setup::leg::IterationTask;
@@ -20,9 +21,9 @@ pub(crate) struct Steps {
     pub(crate) rows: usize,
 }
 
-/// Joint-by-joint identification: θ_k by least squares on `τ_k - B θ_known = A θ_k`, with only the rows of joint k
-/// (Eqs. 9, 10). Earlier estimates contribute with their covariance, `∂θ_k/∂θ_known = -A⁺ B`. Rows of joint k of
-/// recording ℓ are multiplied by `weights[ℓ][k]`.
+/// Estimates the parameters θ_k of each joint k by least squares on `τ_k - B θ_known = A θ_k`, with only the rows of
+/// joint k. Earlier estimates contribute with their covariance, `∂θ_k/∂θ_known = -A⁺ B`. Rows of joint k of recording
+/// ℓ are multiplied by `weights[ℓ][k]`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
     logs: &Logs<'_>,
@@ -84,18 +85,18 @@ pub(crate) fn step_by_step(
 
 struct Places<'a> {
     columns: &'a [usize],
-    /// Stated, or estimated at an outer joint.
+    /// Known columns: given in the study, or estimated at an outer joint.
     known: &'a [usize],
     unknown: &'a [usize],
-    /// Those of the known that were estimated at an outer joint.
+    /// Known columns that were estimated at an outer joint.
     uncertain: &'a [usize],
 }
 
 /// One joint's rows, with the torque of the known columns subtracted.
 struct Factors {
-    /// For the unknown columns.
+    /// Rows over the unknown columns.
     factor: SegmentedFactor,
-    /// For the unknown and the uncertain columns.
+    /// Rows over the unknown columns and the uncertain known columns.
     wide: TriangularFactor,
 }
 

@@ -1,37 +1,37 @@
 use crate::evidence::run_evidence::Clipping;
 use dynident_simulation::Record;
 
-/// Distance from a stated limit at which a torque is clipped: a share of the limit, or a number of standard deviations
-/// of the noise.
+/// A torque is clipped if it is closer to the limit than this: a share of the limit, or a number of standard
+/// deviations of the noise.
 const LIMIT_TOLERANCE_SHARE: f64 = 1e-3;
 const LIMIT_TOLERANCE_SIGMAS: f64 = 3.0;
 
-/// Saturation without a stated limit: the band below the largest torque (a share of it, or a number of standard
-/// deviations of the noise) contains at least `MIN_TOP_SHARE` of the samples, and `MIN_TOP_RATIO` times as many as the
-/// next band. The ratio is 2.4 for a sine and below 1 for Gaussian noise.
+/// Detection of saturation if no limit is given. The band below the largest torque (a share of it, or a number of
+/// standard deviations of the noise) must contain at least `MIN_TOP_SHARE` of the samples, and `MIN_TOP_RATIO` times
+/// as many samples as the next band. This ratio is 2.4 for a sine and below 1 for Gaussian noise.
 const BAND_SHARE: f64 = 2e-3;
 const BAND_SIGMAS: f64 = 7.0;
 const MIN_TOP_SHARE: f64 = 0.02;
 const MIN_TOP_RATIO: f64 = 5.0;
-/// Largest width of the band as a share of the torque; with more noise, saturation is not detectable.
+/// Largest width of the band as a share of the torque; with more noise, saturation cannot be detected.
 const MAX_BAND_SHARE: f64 = 0.05;
 
-/// Averaging of saturated samples: largest block length in samples, and smallest number of blocks.
+/// Averaging of saturated samples: maximum length of a block in samples, and minimum number of blocks.
 const MAX_BLOCK_SAMPLES: usize = 100;
 const MIN_BLOCKS: usize = 10;
-/// Largest variation of the block means: a multiple of that of white noise (coloured noise varies more), plus a share
-/// of the torque (rounding).
+/// Largest variation of the block means: a multiple of the variation of white noise (correlated noise varies more),
+/// plus a share of the torque (rounding).
 const MAX_COLOURED_NOISE_RATIO: f64 = 3.0;
 const ROUNDING_SHARE: f64 = 1e-4;
 
-/// A joint moves if its position changes, over this share of a record to either side, by more than `MIN_MOTION_RATIO`
-/// times the root mean square of such changes.
+/// A joint moves if its position changes by more than `MIN_MOTION_RATIO` times the root mean square of such changes.
+/// The changes are measured over this share of a record to either side.
 const STEP_SHARE: f64 = 1e-3;
 const MIN_MOTION_RATIO: f64 = 0.02;
 
-/// Saturated samples of one joint over the records of all legs: at the stated limit, or, if the torque never reaches
-/// it, at the largest torque of the log if samples of the moving joint accumulate there. Samples at rest are excluded,
-/// because an arm at rest also has constant torque.
+/// Saturated samples of one joint over the records of all trajectories. They are at the given limit. If the torque
+/// never reaches it, they are at the largest torque of the log, if samples of the moving joint accumulate there.
+/// Samples at rest are excluded, because an arm at rest also has constant torque.
 pub(crate) fn clipping(records: &[Record], joint: usize, limit: Option<f64>, noise: f64) -> Option<Clipping> {
     let torques: Vec<f64> = records.iter().flat_map(|record| &record.tau[record.of(joint)]).copied().collect();
     let count = torques.len() as f64;
@@ -41,7 +41,7 @@ pub(crate) fn clipping(records: &[Record], joint: usize, limit: Option<f64>, noi
     }
     if let Some(limit) = limit.filter(|limit| limit.is_finite()) {
         let near = (LIMIT_TOLERANCE_SHARE * limit).max(LIMIT_TOLERANCE_SIGMAS * noise);
-        // A drive that exceeds the stated limit is not clipped there.
+        // A drive whose torque exceeds the given limit is not clipped at this limit.
         if largest <= limit + 2.0 * near {
             let at = torques.iter().filter(|tau| tau.abs() >= limit - near).count();
             if at > 0 {
@@ -61,8 +61,9 @@ pub(crate) fn clipping(records: &[Record], joint: usize, limit: Option<f64>, noi
     flat.then_some(Clipping { share: top / count, torque: largest, stated: false })
 }
 
-/// Whether these torques are constant except for noise: the variation of their block means is explained by (coloured)
-/// noise and rounding. Gravity and acceleration that balance for a while accumulate near a torque that drifts.
+/// Whether these torques are constant except for noise: (correlated) noise and rounding explain the variation of
+/// their block means. If gravity and acceleration balance for a while, torques also accumulate, but near a torque
+/// that drifts.
 fn is_constant(torques: impl Iterator<Item = f64>, noise: f64) -> bool {
     let torques: Vec<f64> = torques.collect();
     let block = (torques.len() / MIN_BLOCKS).clamp(1, MAX_BLOCK_SAMPLES);

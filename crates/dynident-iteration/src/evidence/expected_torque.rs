@@ -1,4 +1,4 @@
-//! The torque that an estimate predicts along a trajectory, for an observer of the motion.
+//! The torque that an estimate predicts along a trajectory, for the display of a running motion.
 
 use crate::estimation::estimate::RunEstimate;
 use crate::estimation::forecast::covariance;
@@ -9,7 +9,7 @@ use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panel
 use dynident_simulation::Reference;
 use nalgebra::{DMatrixView, DVector};
 
-/// Largest number of times; an observer draws lines between them.
+/// Maximum number of times; the display draws lines between them.
 const MAX_TIMES: usize = 600;
 
 /// Computes `w(t)ᵀ θ` and the band `1.96 √(w(t)ᵀ C w(t) + σ²)` along the trajectory for each joint, with the base

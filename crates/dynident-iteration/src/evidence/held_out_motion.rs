@@ -2,27 +2,28 @@ use crate::evidence::run_evidence::RunEvidence;
 use crate::setup::leg::Leg;
 use serde::{Deserialize, Serialize};
 
-/// A motion that is never fitted.
+/// A motion that is never used for a fit, only for validation.
 #[derive(Clone, Debug)]
 pub struct HeldOutMotion {
     /// The motion.
     pub leg: Leg,
-    /// The motion is run after every N good runs; `None` for the end only. In any case an iteration converges only
+    /// The motion runs after every N good runs; `None`: only at the end. In any case, an iteration converges only
     /// after its newest model was validated on this motion.
     pub every: Option<usize>,
 }
 
-/// A run of the held-out motion with the model of the run before it.
+/// A run of the held-out motion with the model of the previous run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HeldOutRun {
-    /// Whether it was completed.
+    /// Whether the run was completed.
     pub done: bool,
-    /// How it ended, in words.
+    /// Description of how the run ended.
     pub outcome: String,
     /// Largest distance of each joint from the reference, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// Evidence in its log, including the prediction by the newest model; `None` if it was not completed.
+    /// Evidence in the log of the run, including the prediction by the newest model; `None` if the run was not
+    /// completed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
     /// Why a completed run has no evidence.

@@ -1,4 +1,4 @@
-//! Tests of a run: noise, clipping, prediction, tracking floor, held-out motion.
+//! Evaluation of a run: noise, clipping, prediction, tracking floor, held-out motion.
 
 pub(crate) mod clipping;
 pub(crate) mod expected_torque;

@@ -3,10 +3,12 @@ use dynident_identification::rows::{JointRows, RowConsumer, predicted_torque};
 use dynident_identification::{LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
-/// Half width of a 95 % interval in standard deviations; runs have far more rows than parameters.
+/// Half-width of a 95 % interval in standard deviations; runs have far more rows than parameters, so this is the
+/// normal value.
 pub(crate) const HALF_WIDTH_95_SIGMAS: f64 = 1.96;
 
-/// L with `Lᵀ L` the covariance of some columns, by eigenvalues, because covariances from few segments are singular.
+/// Matrix L with `Lᵀ L` equal to the covariance of some columns. It is computed by eigenvalues, because covariances
+/// from few segments are singular.
 pub(crate) fn covariance_root(covariance: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     let eigen = covariance.select_rows(columns).select_columns(columns).symmetric_eigen();
     let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
@@ -19,8 +21,8 @@ pub(crate) struct Known<'a> {
     pub(crate) joint_sigma: &'a [f64],
 }
 
-/// Evaluates the prediction of the torque of the recordings `indices` by `known`, joint by joint; `None` for a joint
-/// without rows.
+/// Compares the measured torque of the recordings `indices` with the prediction by `known`, joint by joint; `None`
+/// for a joint without rows.
 pub(crate) fn predictions(
     logs: &Logs<'_>,
     model: &RegressorModel,

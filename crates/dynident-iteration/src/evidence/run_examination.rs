@@ -16,8 +16,8 @@ use dynident_identification::{Execution, Logs, RegressorModel};
 use dynident_recording::{cutoff, position_noise};
 use dynident_simulation::Record;
 
-/// The largest tracking error of each joint with which it still follows, rad (m): half of its range of motion, within
-/// these bounds.
+/// Largest tracking error with which a joint is considered to follow its trajectory, rad (m): half of its range of
+/// motion, within these bounds.
 pub(crate) fn following_limits(legs: &[Leg], dof: usize, [low_rad, high_rad]: [f64; 2]) -> Vec<f64> {
     let range = |joint: usize| {
         let of_leg = |leg: &Leg| {
@@ -31,8 +31,8 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize, [low_rad, high_rad]: [f
     (0..dof).map(|joint| (0.5 * range(joint)).clamp(low_rad, high_rad)).collect()
 }
 
-/// Examines the records of a run, including the prediction by `known` (the estimate before the run), without rows
-/// within the margins around rests; `task` includes the selected friction.
+/// Examines the records of a run, including the prediction by `known` (the estimate before the run). Rows within the
+/// margins around rest are excluded; `task` includes the selected friction.
 pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],
@@ -86,7 +86,8 @@ fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
     let mut most = vec![TorqueNoise::default(); dof];
     for record in records.iter().filter(|record| record.samples > 0) {
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
-        // Torque ends where positions end; only friction at reversals goes beyond.
+        // The spectrum of torque ends where that of positions ends; only friction at reversals has higher
+        // frequencies.
         let motion_hz = cutoff(&q, record.rate_hz).cutoff_hz;
         for (joint, most) in most.iter_mut().enumerate() {
             let tau = &record.tau[record.of(joint)];
@@ -113,7 +114,7 @@ fn predict(
     let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins };
     let recordings = recordings(task, &[log], settings)?;
     let mut identification = identification_settings(task, settings, 1);
-    // The lag was also removed from the rows of the fit.
+    // The same lag was removed from the rows of the fit.
     identification.motion.torque_lag_s = known.lag.taken_off();
     let all: Vec<usize> = (0..recordings.len()).collect();
     let logs =
@@ -147,7 +148,7 @@ fn predict(
     Ok(())
 }
 
-/// Adds the tracking error of each joint that noise, friction and delay explain, if any joint exceeds the tolerance.
+/// Adds the tracking error that noise, friction and delay explain for each joint, if any joint exceeds the tolerance.
 /// `known` is the estimate after the run, `friction` the selected friction.
 pub(crate) fn add_tracking_floors(
     evidence: &mut RunEvidence,
@@ -172,7 +173,7 @@ pub(crate) fn add_tracking_floors(
         let known = KnownLoop { robot, parameters, friction, controller, position_noise, delay_s };
         let Some(of_leg) = tracking_floor(leg.reference(), record, &known) else { return };
         floors.iter_mut().zip(of_leg.floor).for_each(|(most, floor)| *most = most.max(floor));
-        // The longest delay of several legs.
+        // The longest delay among several trajectories.
         feedback_delay_s = feedback_delay_s.into_iter().chain(of_leg.feedback_delay_s).reduce(f64::max);
     }
     evidence.feedback_delay_s = feedback_delay_s;

@@ -1,39 +1,41 @@
-//! Noise of a logged torque, without torque that the model may not explain.
+//! Noise of a logged torque, separated from torque that the model may not explain.
 //!
-//! Friction changes stepwise at reversals, and a step has a spectrum up to half the sample rate. Noise is always
-//! present. So the spectral density of the torque is computed over windows, octave by octave from the end of the
-//! motion's spectrum, each with windows as short as the octave allows. The lower quartile over the windows is used, of
-//! windows without a reversal if there are enough. Below the motion's end the noise has the density of the first
-//! octave.
+//! Friction jumps at reversals, and a jump has a spectrum up to half the sampling rate. Noise, however, is always
+//! present. So the spectral density of the torque is computed over time windows, octave by octave, beginning at the
+//! highest frequency of the motion. Each octave has windows as short as possible. The lower quartile over the windows
+//! is the noise; only windows without a reversal are used if there are enough. Below the highest frequency of the
+//! motion, the noise is assumed to have the density of the first octave.
 //!
-//! Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70; Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931)
-//! 684, for the quartile of the means of several densities.
+//! Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70. For the quartile of the means of several densities:
+//! Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684.
 
 use core::f64::consts::{PI, TAU};
 use core::ops::Range;
 
-/// Periods of an octave's lowest frequency in a window, which then has four frequencies of the octave.
+/// Length of a window in periods of an octave's lowest frequency; a window then contains four frequencies of the
+/// octave.
 const PERIODS_PER_WINDOW: usize = 4;
-/// Number of independent densities among the four of a window with a Hann taper.
+/// Number of independent densities among the four frequencies of a window with a Hann taper.
 const INDEPENDENT_DENSITIES: f64 = 2.7;
-/// Smallest number of windows without a reversal that are used without the others.
+/// Minimum number of windows without a reversal with which the other windows are not used.
 const MIN_WINDOWS: usize = 12;
-/// Ratio of the densities of two octaves above which the first contains motion: first-order noise falls by 4, the
-/// torque of a motion by 16 and more.
+/// Ratio of the densities of two consecutive octaves above which the lower octave contains motion: first-order noise
+/// falls by a factor of 4, the torque of a motion by 16 and more.
 const MIN_MOTION_DENSITY_RATIO: f64 = 8.0;
-/// A joint reverses in a window if a quarter of it moves the joint less than this share of the mean of the quarters.
+/// A joint reverses in a window if in one quarter of the window it moves less than this share of its mean motion per
+/// quarter.
 const MIN_QUARTER_SHARE: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TorqueNoise {
     /// Standard deviation of one sample, Nm (N).
     pub(crate) of_sample: f64,
-    /// Density of the noise at the lowest resolved frequencies, Nm²/Hz.
+    /// Spectral density of the noise at the lowest resolved frequencies, Nm²/Hz.
     density: f64,
 }
 
 impl TorqueNoise {
-    /// Standard deviation of the noise after a low-pass, Nm (N).
+    /// Standard deviation of the noise after a low-pass filter, Nm (N).
     pub(crate) fn below(self, cutoff_hz: f64) -> f64 {
         (self.density * cutoff_hz).sqrt()
     }
@@ -43,17 +45,17 @@ impl TorqueNoise {
     }
 }
 
-/// Estimates the noise of the uniformly sampled torque `tau` of a joint with the positions `q`, whose motion ends at
-/// `motion_hz`. Zero if there are too few samples or all are equal.
+/// Estimates the noise of the uniformly sampled torque `tau` of a joint with the positions `q`, whose motion has
+/// frequencies up to `motion_hz`. Zero if there are too few samples or all are equal.
 pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64) -> TorqueNoise {
     let nyquist_hz = 0.5 * rate_hz;
     if tau.len() != q.len() || !(motion_hz > 0.0 && nyquist_hz.is_finite()) || tau.iter().any(|tau| !tau.is_finite()) {
         return TorqueNoise::default();
     }
-    // Third differences, so that the rest of the motion's slow torque does not leak through the tapers.
+    // Third differences prevent that the slow torque of the motion leaks through the tapers.
     let third: Vec<f64> = tau.windows(4).map(|x| x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).collect();
     let mut octaves: Vec<([f64; 2], f64)> = Vec::new();
-    // At least one octave, if necessary the highest.
+    // At least one octave is evaluated, if necessary the highest.
     let mut from_hz = motion_hz.min(0.5 * nyquist_hz);
     while from_hz < 0.9 * nyquist_hz {
         let to_hz = if 2.2 * from_hz > nyquist_hz { nyquist_hz } else { 2.0 * from_hz };
@@ -66,7 +68,7 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
     let motion = octaves.windows(2).take_while(|two| two[0].1 > MIN_MOTION_DENSITY_RATIO * two[1].1).count();
     octaves.drain(..motion);
     let lowest = octaves.first().map(|(_, density)| *density);
-    // The noise below the motion's end has the density of the first octave.
+    // The noise below the highest frequency of the motion has the density of the first octave.
     let below = octaves.first().map_or(0.0, |([from_hz, _], density)| from_hz * density);
     let variance = below + octaves.iter().map(|([from_hz, to_hz], density)| (to_hz - from_hz) * density).sum::<f64>();
     let step = quantum(tau);
@@ -128,7 +130,8 @@ fn moves_one_way(q: &[f64]) -> bool {
     })
 }
 
-/// The step of a quantised torque: the smallest nonzero difference of neighbours; nearly zero without quantisation.
+/// Quantisation step of a torque: the smallest nonzero difference of neighbouring samples; nearly zero without
+/// quantisation.
 fn quantum(tau: &[f64]) -> f64 {
     let steps = tau.windows(2).map(|two| (two[1] - two[0]).abs()).filter(|step| *step > 0.0);
     let least = steps.fold(f64::INFINITY, f64::min);

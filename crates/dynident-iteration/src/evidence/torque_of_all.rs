@@ -1,4 +1,4 @@
-//! The largest torque that a motion needs over all models within the uncertainty.
+//! The largest torque that a motion needs, over all models within the uncertainty of the parameters.
 
 use crate::estimation::estimate::RunEstimate;
 use crate::estimation::forecast::covariance;
@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 const SAMPLES_AT_ONCE: usize = 2048;
 
-/// Approximate rate of the evaluated samples, Hz for an arm of 1.2 m; rigid-body torques change little in between.
+/// Approximate rate of the evaluated samples, Hz for an arm of 1.2 m; rigid-body torques change little between them.
 const RATE_HZ: f64 = 500.0;
 
 /// One-sided 95 % point of the standard normal distribution.
@@ -18,15 +18,16 @@ const NORMAL_95: f64 = 1.644_853_6;
 
 #[derive(Clone, Debug)]
 pub(crate) struct LargestTorque {
-    /// Over all models in the 95 % ellipsoid of the parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, the largest `|wᵀϑ|` with `(ϑ -
-    /// θ)ᵀ C⁻¹ (ϑ - θ) ≤ χ²`; also around the physically consistent model of the controllers.
+    /// Largest torque over all models in the 95 % ellipsoid of the parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, which is the
+    /// largest `|wᵀϑ|` with `(ϑ - θ)ᵀ C⁻¹ (ϑ - θ) ≤ χ²`. Also around the physically consistent model of the
+    /// controllers.
     pub(crate) of_all: Vec<f64>,
-    /// Largest excess over the torque in the model of a search.
+    /// Largest excess over the torque by the model that the search uses.
     pub(crate) beyond_search: Vec<f64>,
 }
 
-/// Computes the largest torques along a trajectory. `searched` returns the torque in the model of a search, joint-major
-/// along a motion.
+/// Computes the largest torques along a trajectory. `searched` returns the torque by the model that the search uses,
+/// joint-major along a motion.
 pub(crate) fn largest_torque(
     robot: &ParametricModel,
     known: &RunEstimate,
@@ -80,8 +81,8 @@ pub(crate) fn samples_of(whole: &Motion, some: &[usize]) -> Motion {
     part
 }
 
-/// The 95 % point of χ² with this number of degrees of freedom, by the Wilson-Hilferty approximation (Proc. Nat. Acad.
-/// Sci. 17 (1931) 684): within 2.5 % from one degree on, within 0.1 % from ten.
+/// The 95 % point of χ² with this number of degrees of freedom, by the Wilson-Hilferty approximation (Proc. Nat.
+/// Acad. Sci. 17 (1931) 684). The error is at most 2.5 % from one degree of freedom on, and 0.1 % from ten on.
 fn chi_squared_95(degrees_of_freedom: usize) -> f64 {
     if degrees_of_freedom == 0 {
         return 0.0;

@@ -1,8 +1,9 @@
 //! The tracking floor: the tracking error that noise, friction and delay explain.
 //!
-//! A delay between the encoders and the controller is not visible in the log, because its positions and torques have
-//! the same time. But it causes a tracking error: a controller that receives positions `d` seconds late pushes the
-//! joint ahead by about `d q̇`. So the delay is estimated by matching simulated tracking errors to those of the run.
+//! A delay between the encoders and the controller is not visible in the log, because logged positions and torques
+//! have the same time. But it causes a tracking error: a controller that receives positions `d` seconds late pushes
+//! the joint ahead by about `d q̇`. So the delay is estimated by matching simulated tracking errors to those of the
+//! run.
 
 use crate::signals::dry_steps::{with_dry_steps, with_sticking_joints};
 use crate::signals::rests::highest_speeds;
@@ -17,8 +18,8 @@ use dynident_simulation::{Integrator, LoopSettings, Plant, Record, Reference, Ru
 const SEED: u64 = 17;
 /// Longest feedback delay, s, for an arm of 1.2 m.
 const MAX_FEEDBACK_DELAY_S: f64 = 10e-3;
-/// Largest ratio of the squared tracking errors with and without a delay that explains them (more than half of the
-/// error).
+/// Largest ratio of the sums of squared tracking errors with and without a delay, for the delay to be accepted: it
+/// then explains more than half of the error.
 const MAX_SQUARED_ERROR_RATIO: f64 = 0.25;
 /// Largest relative deviation of the log's rate from the controller's.
 const MAX_RATE_DEVIATION: f64 = 1e-3;
@@ -26,26 +27,27 @@ const MAX_RATE_DEVIATION: f64 = 1e-3;
 pub(crate) struct KnownLoop<'a> {
     pub(crate) robot: &'a ParametricModel,
     pub(crate) parameters: &'a [f64],
-    /// The selected friction, with the uncertainty of its constants; empty if the friction was stated.
+    /// The selected friction, with the uncertainty of its constants; empty if friction was not selected.
     pub(crate) friction: &'a [JointFriction],
     pub(crate) controller: &'a ControllerSettings,
-    /// Standard deviation of the noise of each position, rad (m).
+    /// Standard deviation of the noise of each joint's position, rad (m).
     pub(crate) position_noise: &'a [f64],
     /// Delay of the positions in the log, s.
     pub(crate) delay_s: f64,
 }
 
 pub(crate) struct TrackingFloor {
-    /// Largest explained tracking error of each joint, rad (m).
+    /// Largest tracking error of each joint that is explained, rad (m).
     pub(crate) floor: Vec<f64>,
-    /// The feedback delay that explains more than half of the error, s; `None` otherwise.
+    /// The feedback delay, s, if it explains more than half of the error.
     pub(crate) feedback_delay_s: Option<f64>,
 }
 
-/// Largest tracking error of each joint in a simulated run of the estimated robot, with the same controller and that
-/// robot as its model. The simulation includes the position noise of the log, the measured delay, the feedback delay,
-/// and narrow friction steps as dry friction; if joints may [stick](with_sticking_joints) with more friction, the
-/// larger error of both is used. `None` if the run cannot be simulated or is not completed.
+/// Largest tracking error of each joint in a simulation of the estimated robot, with the same controller, whose model
+/// is the estimated robot. The simulation includes the position noise of the log, the measured delay and the feedback
+/// delay. Narrow smoothed sign functions of friction are simulated as dry friction. If joints may
+/// [stick](with_sticking_joints) with more friction, the larger error of both simulations is used. `None` if the run
+/// cannot be simulated or is not completed.
 pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &KnownLoop<'_>) -> Option<TrackingFloor> {
     let fastest = highest_speeds([reference]);
     let terms = known.robot.terms();
@@ -73,11 +75,11 @@ fn floor_with(
 ) -> Option<TrackingFloor> {
     let samples = |delay_s: f64| (delay_s * reference.rate_hz()).round() as usize;
     let explained = |run: &Run| -> Vec<f64> {
-        // A delay in the log appears as a tracking error.
+        // A delay of the positions in the log appears as a tracking error.
         run.max_error.iter().zip(fastest).map(|(error, fastest)| error + known.delay_s * fastest).collect()
     };
-    // The controller may have the delay of the log, too, but drives that close their own loop do not. If the loop is
-    // unstable with this delay, the executed run did not have it.
+    // The controller may receive positions with the delay of the log, but drives with an internal position loop do
+    // not. If the loop is unstable with this delay, the actual run did not have it.
     let late_by_log = samples(known.delay_s);
     let (of_log, plain) = match simulated(reference, known, friction.0, friction.1, late_by_log) {
         Some(run) => (late_by_log, run),
@@ -100,7 +102,7 @@ fn floor_with(
     Some(TrackingFloor { floor: explained(&plain), feedback_delay_s: None })
 }
 
-/// A run of the estimated robot with a feedback delay of `late` samples.
+/// Simulates a run of the estimated robot with a feedback delay of `late` samples.
 fn simulated(
     reference: &Reference,
     known: &KnownLoop<'_>,
@@ -128,7 +130,7 @@ fn simulated(
     run.status.is_done().then_some(run)
 }
 
-/// Whether the samples of the log have the times of a simulated run.
+/// Whether the samples of the log have the same times as those of a simulated run.
 fn has_same_clock(reference: &Reference, record: &Record) -> bool {
     (record.rate_hz / reference.rate_hz() - 1.0).abs() < MAX_RATE_DEVIATION && record.samples > 0
 }
@@ -141,8 +143,9 @@ fn positions<'a>(record: &'a Record, run: &'a Run) -> impl Iterator<Item = (&'a 
     })
 }
 
-/// The delay, in samples, that minimises the squared difference of the log's positions to simulated ones: least squares
-/// with the effect of one sample of delay, `Σ (q - q₀)(q₁ - q₀) / Σ (q₁ - q₀)²`.
+/// The delay, in samples, that minimises the squared difference between the log's positions q and simulated ones:
+/// least squares with the positions q₀ without delay and q₁ with one sample of delay, `Σ (q - q₀)(q₁ - q₀) / Σ (q₁ -
+/// q₀)²`.
 fn delay_in_samples(record: &Record, plain: &Run, one_late: &Run) -> Option<usize> {
     let (mut across, mut square) = (0.0, 0.0);
     for ((logged, without), (_, with)) in positions(record, plain).zip(positions(record, one_late)) {

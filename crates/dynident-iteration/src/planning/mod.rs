@@ -1,4 +1,4 @@
-//! The motion of the next run.
+//! Planning of the motion of the next run.
 
 pub(crate) mod planned_run;
 pub(crate) mod planner;

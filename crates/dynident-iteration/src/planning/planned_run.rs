@@ -7,7 +7,7 @@ use crate::setup::error::IterationError;
 use crate::setup::leg::{IterationTask, Leg};
 
 /// Plans the run after `records`, the last of which is good; `task` includes the selected friction. If runs are not
-/// pooled, or could not be fitted together, only the last is used.
+/// fitted together, or could not be, only the last run is used.
 pub(crate) fn planned_motion(
     planner: &dyn MotionPlanner,
     task: &IterationTask,

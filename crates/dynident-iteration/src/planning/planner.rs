@@ -6,44 +6,44 @@ use crate::setup::error::IterationError;
 use crate::setup::leg::Leg;
 use dynident_dynamics::ParametricModel;
 
-/// State before a run.
+/// Data that a planner receives before a run.
 #[derive(Clone, Copy, Debug)]
 pub struct BeforeRun<'a> {
     /// Number of the run to be planned, from 2.
     pub run: usize,
     /// The robot with the selected friction.
     pub robot: &'a ParametricModel,
-    /// Estimate of all good runs, or of the last one if they are not pooled.
+    /// Estimate from all good runs, or from the last good run if runs are not fitted together.
     pub known: &'a RunEstimate,
     /// The runs of this estimate, in order; not empty.
     pub good: &'a [GoodRun<'a>],
     /// Torque limit of each joint, Nm (N), or infinity.
     pub torque_limits: Option<&'a [f64]>,
-    /// Signal on which a search ends with its best result.
+    /// Signal that ends a search with its best result.
     pub stop: Option<&'a StopSignal>,
 }
 
 /// A good run as input of planners.
 #[derive(Clone, Copy, Debug)]
 pub struct GoodRun<'a> {
-    /// Its legs.
+    /// Trajectories of the run.
     pub legs: &'a [Leg],
-    /// The estimate from this run alone.
+    /// Estimate from this run alone.
     pub estimate: &'a RunEstimate,
 }
 
 /// The planned motion of a run, with its forecast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedMotion {
-    /// Trajectories, leg by leg; `None` repeats those of the previous good run.
+    /// Trajectories; `None` repeats those of the previous good run.
     pub motion: Option<RunMotion>,
     /// The forecast.
     pub forecast: MotionForecast,
 }
 
-/// Plans the next motion, from the second good run on. Without a planner every run repeats the motion of the task.
+/// Plans the next motion, after the first good run. Without a planner every run repeats the motion of the task.
 pub trait MotionPlanner: core::fmt::Debug + Send + Sync {
-    /// Plans the motion of a run that follows a good one. It is called once per run: the plan is stored with the
+    /// Plans the motion of a run that follows a good run. It is called once per run, and the plan is stored with the
     /// iteration, so it need not be reproducible.
     ///
     /// # Errors

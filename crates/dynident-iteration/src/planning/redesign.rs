@@ -22,22 +22,24 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Order p of the Kiefer criterion on the variances of the worst directions (1 is their mean, infinity the largest). On
-/// the UR10 of the examples, after its D-optimal motion, two runs at order 1, 2 and 4 leave 65, 63 and 61 % of the ten
-/// widest error bars that repeating the motion would leave (root mean squares).
+/// Order p of the Kiefer criterion for the variances along the directions with the widest error bars (1 is their
+/// mean, infinity the largest). On the UR10 of the examples, after its D-optimal motion, two further runs at order 1,
+/// 2 and 4 reduce the ten widest error bars to 65, 63 and 61 % of their size after repeating the motion (root mean
+/// squares).
 const CRITERION_ORDER: f64 = 4.0;
 
 /// Number and seed of the random states over the workspace.
 const STATES: usize = 2_000;
 const STATES_SEED: u64 = 1;
 
-/// Largest number of searches; each has lower torque limits than the one before, until all models keep the limits.
+/// Maximum number of searches. Each search has lower torque limits than the previous one, until all models keep the
+/// limits.
 const MAX_SEARCHES: usize = 4;
 
-/// Factor on the torque excess of a search by which the limits of the next search are reduced.
+/// The limits of the next search are reduced by this factor times the torque excess of the last search.
 const TORQUE_REDUCTION_FACTOR: f64 = 1.1;
 
-/// Tolerance within which a motion returns to its begin, rad (m).
+/// Tolerance within which a motion ends where it begins, rad (m).
 const RETURN_TOLERANCE: f64 = 1e-6;
 
 /// Settings of the redesign of motions.
@@ -45,8 +47,9 @@ const RETURN_TOLERANCE: f64 = 1e-6;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RedesignSettings {
-    /// Smallest forecast reduction of the error bars of the worst directions, in percent, for which an iteration that
-    /// has otherwise converged makes another run. Default 20: the second run of one motion brings 29, the third 18.
+    /// Minimum forecast reduction of the widest error bars, in percent, for which an iteration that has otherwise
+    /// converged makes another run. Default 20: the second run of the same motion reduces them by 29 %, the third by
+    /// 18 %.
     pub least_gain_percent: f64,
 }
 
@@ -105,13 +108,13 @@ enum NotRedesigned {
     Numbers(#[from] SimulationError),
 }
 
-/// Designs the next motion from the current estimate. The information of the new motion adds to that of all good runs,
-/// `D = Σ Wᵀ Σ⁻¹ W` with the estimated noise, and the criterion is [`KieferPhiP`] of the sum. Directions are
-/// scaled by the torque error that they cause over random states within the limits of position, velocity and
-/// acceleration, in units of the joint noise. The torque limits hold for every model in the uncertainty (95 % ellipsoid
-/// of the parameters): the search uses the estimated bodies, friction and drives with limits reduced by the effect of
-/// the uncertainty. The result is checked with all models and searched again with lower limits if one exceeds them. The
-/// motion begins where the first motion began.
+/// Designs the next motion from the current estimate. The information of the new motion is added to that of all good
+/// runs, `D = Σ Wᵀ Σ⁻¹ W` (regressor W, covariance Σ of the estimated noise), and the criterion is [`KieferPhiP`] of
+/// the sum. Directions in the parameter space are scaled by the torque error that they cause over random states
+/// within the limits of position, velocity and acceleration, in units of the joint noise. The torque limits hold for
+/// every model within the uncertainty (95 % ellipsoid of the parameters). The search uses the estimated bodies,
+/// friction and drives, with limits reduced by the effect of the uncertainty. The result is checked with all models;
+/// if one exceeds a limit, the search is repeated with lower limits. The motion begins where the first motion began.
 #[derive(Debug)]
 pub struct Redesign {
     family: WithStartPosture,
@@ -123,8 +126,8 @@ pub struct Redesign {
 }
 
 impl Redesign {
-    /// Creates a planner for motions of a family within limits, which replace the motion of `leg` (the only leg of the
-    /// task).
+    /// Creates a planner for motions of a family within limits, which replace the trajectory `leg` (the only one of
+    /// the task).
     ///
     /// # Errors
     /// Settings out of range, or a family with other joints.
@@ -193,7 +196,7 @@ impl Redesign {
         names.iter().enumerate().map(|(joint, name)| of_design(name).min(of_drive(joint))).collect()
     }
 
-    /// Torque of friction and drives in the search: estimated, or nominal before any run.
+    /// Torque of friction and drives that the search uses: estimated, or nominal before the first run.
     fn known_torque(&self, before: &BeforeRun<'_>) -> KnownTorque {
         let Some(all) = &before.known.possible else { return self.limits.known_torque.clone() };
         let values = &all[before.robot.model().inertial_count()..];
@@ -230,7 +233,7 @@ impl Redesign {
             torque_std_nm: &noise.joint_sigma,
             prior: Some(&information.total),
         };
-        // Each run uses other random starts and the row rate of the estimates.
+        // Each run has different random starts; the sampling rate is that of the estimates' rows.
         let seed = self.search.seed.wrapping_add(before.run as u64);
         let settings = DesignSettings { seed, rate_hz: noise.rows_per_s, ..self.search.clone() };
         let stopped = || before.stop.is_some_and(StopSignal::is_requested);
@@ -238,8 +241,9 @@ impl Redesign {
         Ok(design(&task, &settings, watch)?)
     }
 
-    /// Random states over the workspace, joints independent: positions within their limits and at most half a turn (0.5
-    /// m) to either side; velocities and accelerations within their limits, or up to the maxima of the earlier motions.
+    /// Random states over the workspace, with independent joints. Positions are within their limits and at most half
+    /// a turn (0.5 m) from zero. Velocities and accelerations are within their limits, or at most the maxima of the
+    /// earlier motions.
     fn states(&self, before: &BeforeRun<'_>) -> Motion {
         let joints = before.robot.model().joints();
         let mut random = Random::new(STATES_SEED);
@@ -254,7 +258,7 @@ impl Redesign {
             };
             let free = if joint.is_rotary() { core::f64::consts::PI } else { 0.5 };
             let [lower, upper] = limit.and_then(|limit| limit.position).unwrap_or([-free, free]);
-            // A range without overlap with that interval is used unchanged.
+            // A position range that does not overlap that interval is used unchanged.
             let overlaps = lower < free && upper > -free;
             let [lower, upper] = if overlaps { [lower.max(-free), upper.min(free)] } else { [lower, upper] };
             let speed = limit.and_then(|limit| limit.speed).unwrap_or_else(|| highest(|motion| &motion.dq));
@@ -366,7 +370,7 @@ fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, S
     Ok(robot.model().with_inertials(&bodies)?)
 }
 
-/// Largest torque magnitude along a motion in the model of the search, joint-major, Nm (N).
+/// Largest torque magnitude along a motion, computed with the model of the search, joint-major, Nm (N).
 fn searched_torque(model: &Model, known: &KnownTorque, motion: &Motion) -> Vec<f64> {
     let dof = motion.joints;
     let mut workspace = Workspace::new(model);

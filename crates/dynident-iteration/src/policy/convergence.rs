@@ -8,7 +8,7 @@ use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A condition that the last run does not meet, with its numbers; [`remedy`](Self::remedy) suggests a fix.
+/// A condition that the last run does not meet, with its figures; [`remedy`](Self::remedy) suggests a fix.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "condition", rename_all = "kebab-case")]
@@ -25,7 +25,7 @@ pub enum UnmetCondition {
     /// steadily corrects this.
     #[error("the last run was rejected: {reason}")]
     LastRunRejected {
-        /// Why.
+        /// Reason why the run was rejected.
         reason: String,
     },
     /// The last run used a controller without the newest model, or only a part of the model's change. Allow more runs
@@ -36,7 +36,7 @@ pub enum UnmetCondition {
     /// iteration again in an empty folder.
     #[error("run {run} was made by an earlier version, which did not store the evidence of its log")]
     NoEvidence {
-        /// The run.
+        /// Number of the run.
         run: usize,
     },
     /// The robot does not follow the motion as closely as required. Something is missing in the model (stiction,
@@ -45,7 +45,7 @@ pub enum UnmetCondition {
     Tracking {
         /// The joint.
         joint: String,
-        /// Its largest distance, rad (m).
+        /// Largest distance of the joint from the reference, rad (m).
         error_rad: f64,
         /// Tolerance, rad (m).
         tolerance_rad: f64,
@@ -56,9 +56,9 @@ pub enum UnmetCondition {
     /// on temperature, or the model lacks a term.
     #[error("{parameter} changed by {bars:.1} error bars with the last run, the limit is {allowed:.1}")]
     ParameterMoves {
-        /// The base parameter.
+        /// Symbol of the base parameter.
         parameter: String,
-        /// Change in error bars.
+        /// Change, in error bars.
         bars: f64,
         /// Largest accepted change in error bars.
         allowed: f64,
@@ -68,7 +68,7 @@ pub enum UnmetCondition {
         "the error bar of {parameter} is {percent:.0} % of the largest parameter (by torque), the limit is {allowed_percent:.0} %"
     )]
     ParameterUncertain {
-        /// The base parameter.
+        /// Symbol of the base parameter.
         parameter: String,
         /// Torque of its error bar (one standard deviation), percent of the torque of the largest parameter.
         percent: f64,
@@ -81,20 +81,20 @@ pub enum UnmetCondition {
     Clipping {
         /// The joint.
         joint: String,
-        /// Percentage of its samples.
+        /// Percentage of clipped samples.
         percent: f64,
-        /// The torque, Nm (N).
+        /// Clipped torque, Nm (N).
         torque: f64,
-        /// Whether this is a stated limit.
+        /// Whether the torque is a given limit.
         stated: bool,
     },
     /// The recorder stores torque and position at different times, and the correction does not explain all of it.
     /// Record both at the same instant.
     #[error("unexplained lag: the torque of all joints is {lag_ms:.1} +- {half_width_ms:.1} ms (95 %) {after_or_before} the motion", lag_ms = 1e3 * .lag_s.abs(), half_width_ms = 1e3 * .half_width_95_s, after_or_before = if *.lag_s > 0.0 { "after" } else { "before" })]
     Lag {
-        /// Lag after compensation, s.
+        /// Remaining lag after compensation, s.
         lag_s: f64,
-        /// Half the width of its 95 % interval, s.
+        /// Half-width of the 95 % interval of the lag, s.
         half_width_95_s: f64,
     },
     /// The correction of the delay is larger than accepted, so that the logged position is not the true one. Record
@@ -112,11 +112,11 @@ pub enum UnmetCondition {
     LagChanges {
         /// The joint.
         joint: String,
-        /// The lag of the last run, s.
+        /// Lag of the joint in the last run, s.
         lag_s: f64,
-        /// Lag of the good run that differs most, s.
+        /// Lag in the good run that differs most from it, s.
         before_s: f64,
-        /// Half the width of the 95 % interval of their difference, s.
+        /// Half-width of the 95 % interval of the difference, s.
         half_width_95_s: f64,
     },
     /// The robot changed between the runs, for example its temperature, load or a sensor offset. Keep the conditions
@@ -142,7 +142,7 @@ pub enum UnmetCondition {
     /// can follow.
     #[error("the held-out run cannot validate the newest model: {reason}")]
     HeldOutFailed {
-        /// Why.
+        /// Reason why the run failed.
         reason: String,
     },
     /// The model is valid only for the motion of the fit. Use a more exciting motion (`motion = "redesign"`), or other
@@ -209,7 +209,7 @@ impl UnmetCondition {
         matches!(self, Self::Lag { .. } | Self::LongLag { .. } | Self::LagChanges { .. } | Self::Length(_))
     }
 
-    /// Suggested fix.
+    /// Suggests a fix.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::TooFewRuns { .. } => "fix the cause of the rejected run, or allow more runs (max_runs)",
@@ -259,8 +259,8 @@ impl UnmetCondition {
 pub(crate) struct Names {
     pub(crate) joints: Vec<String>,
     pub(crate) parameters: Vec<String>,
-    /// Torque share of each parameter: torque of one unit along the last motion over the joint torque; empty if the
-    /// last run shows no torque.
+    /// Torque share of each parameter: torque of one unit of it along the last motion, relative to the joint torque.
+    /// Empty if the last run has no torque.
     pub(crate) shares: Vec<f64>,
     /// Longest accepted lag, seconds.
     pub(crate) most_lag_s: f64,
@@ -272,18 +272,18 @@ pub(crate) struct Names {
 pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<UnmetCondition> {
     let Some(last) = records.last() else { return vec![UnmetCondition::TooFewRuns { good: 0 }] };
     let wrong_torque = last.torque_causes().iter().cloned().map(UnmetCondition::Torque);
-    // All other findings are consequences of a wrong torque log.
+    // A wrong torque log explains all other findings, so they are not reported.
     if last.torque_causes().iter().any(TorqueCause::is_determined) {
         return wrong_torque.collect();
     }
     let mut found: Vec<UnmetCondition> = wrong_torque.collect();
-    // With torque that is wrong for an unknown reason, no other cause is reliable.
+    // If the torque is wrong for an unknown reason, no other cause is reliable.
     let may_claim = found.is_empty();
     found.extend(unmet(records, settings, names).into_iter().filter(|own| may_claim || !own.is_cause()));
     found
 }
 
-/// Unmet condition of a compensated lag that exceeds the limit by more than its 95 % interval.
+/// Unmet condition if a compensated lag exceeds the limit by more than its 95 % interval.
 fn long_lag(lag: &LagChoice, allowed_s: f64) -> Option<UnmetCondition> {
     (lag.certain_s() > allowed_s).then(|| UnmetCondition::LongLag { lag_s: lag.longest_s(), allowed_s })
 }
@@ -347,8 +347,8 @@ fn of_joint(
         shown.clipping.filter(|clipping| clipping.share > limits.verdict.max_clipped_share)
     {
         let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
-        // Without a stated limit, constant peak torque indicates saturation only if the joint does not follow and no
-        // larger torque was commanded.
+        // If no limit is given, constant peak torque indicates saturation only if the joint does not follow its
+        // trajectory and no larger torque was commanded.
         if stated || beyond && !last.has_commanded_torque(place) {
             found.push(UnmetCondition::Clipping { joint: joint(), percent: 100.0 * share, torque, stated });
         }
@@ -364,7 +364,7 @@ fn of_joint(
     }
     let sigma = last.estimate.as_ref().map_or(0.0, |estimate| {
         let (sigma, near_rest) = (estimate.joint_sigma[place], estimate.near_rest.get(place));
-        // Stiction explains the residual near rest up to its maximum.
+        // Stiction explains the residual near rest up to its maximum torque.
         near_rest.and_then(|found| found.as_ref()?.unexplained_nm(sigma)).unwrap_or(sigma)
     });
     let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
@@ -397,17 +397,17 @@ fn held_out(found: &mut Vec<UnmetCondition>, last: &RunRecord, min_inside_share:
     }
 }
 
-/// Lag of all joints after compensation, if it exceeds its interval and is large enough to matter. Torque that is held
-/// from sample to sample is half a sample late. Differences between joints come from friction and are reported as
-/// unexplained torque.
+/// Lag of all joints that remains after compensation, if it is significant and large enough to matter. Torque that is
+/// held from sample to sample is half a sample late. Differences between joints come from friction and are reported
+/// as unexplained torque.
 fn unexplained_lag(lag: &LagChoice, log_rates_hz: &[f64]) -> Option<TorqueLag> {
     let slowest_hz = log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
     let rest = lag.common.map(|common| TorqueLag { lag_s: common.lag_s - common.taken_off_s, ..common })?;
     (rest.matters && rest.lag_s.abs() > 0.5 / slowest_hz + rest.half_width_95_s).then_some(rest)
 }
 
-/// Lags of a joint in the last good run and in the run that differs most from it, if a lag was compensated and they
-/// differ significantly.
+/// Lags of a joint in the last good run and in the run that differs most from it, if a lag was compensated and the
+/// two lags differ significantly.
 fn changed_lag(good: &[&RunRecord], joint: usize, min_ratio: f64) -> Option<(TorqueLag, TorqueLag)> {
     let (last, before) = good.split_last()?;
     let taken_off = good.iter().filter_map(|record| record.estimate.as_ref()).chain(last.knowledge());
@@ -421,8 +421,8 @@ fn changed_lag(good: &[&RunRecord], joint: usize, min_ratio: f64) -> Option<(Tor
     (bars(&then) > min_ratio).then_some((now, then))
 }
 
-/// Reports the parameter that changed most, if it changed too much, and the parameter with the widest error bar, if it
-/// is too wide.
+/// Reports the parameter that changed most, if it changed too much, and the parameter with the widest error bar, if
+/// the error bar is too wide.
 fn parameters(
     found: &mut Vec<UnmetCondition>,
     old: &RunEstimate,
@@ -453,7 +453,7 @@ fn parameters(
     }
 }
 
-/// Whether a further run of the same motion would add little: the last two good runs used the undamped model-based
+/// Whether a further run of the same motion would add little. The last two good runs used the undamped model-based
 /// controller, no parameter changed or is uncertain, and tracking is within the tolerance or no longer improves.
 pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> bool {
     let [.., before, last] = records else { return false };

@@ -14,20 +14,20 @@ use thiserror::Error;
 /// The next step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
-    /// A run.
+    /// Make this run.
     Run(RunPlan),
-    /// The end of the iteration.
+    /// The iteration has ended.
     Finished(IterationStatus),
 }
 
 /// A planned run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunPlan {
-    /// Its number, from 1.
+    /// Number of the run, from 1.
     pub run: usize,
-    /// Model of its controller; `None` for the controller without a model.
+    /// Model of the controller; `None` for the controller without a model.
     pub model: Option<ModelParameters>,
-    /// Share of the step from the last good parameters to the new ones.
+    /// Share of the change from the last good parameters to the new parameters.
     pub damping: f64,
     /// Factor on the gains of the controller without a model.
     pub stiffness: f64,
@@ -68,7 +68,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if shortfalls(records, settings, names).is_empty() {
         return Next::Finished(IterationStatus::Converged);
     }
-    // Two unchanged results are required: the second of two such runs used the model of the first.
+    // Two unchanged results are required, because the second of two such runs used the model of the first.
     let earlier = &records[..records.len() - 1];
     if stands_still(records, settings, names) && (!settings.reject || stands_still(earlier, settings, names)) {
         return Next::Finished(IterationStatus::Settled);
@@ -87,7 +87,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if run > settings.max_runs {
         return Next::Finished(IterationStatus::RunsUsedUp);
     }
-    // A rejected model is not tried again.
+    // A model that was rejected is not used again.
     let untried = |model: &ModelParameters| {
         !records.iter().any(|record| !record.accepted && record.controller.model.as_ref() == Some(model))
     };
@@ -95,7 +95,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if let Some(model) = trusted.into_iter().chain(newest.filter(|_| last.accepted)).find(untried) {
         return Next::Run(RunPlan::with_model(run, model, 1.0));
     }
-    // Rejected: go back towards the last good model, if there is one.
+    // After a rejection the next model is between the rejected and the last good model, if there is one.
     let since = records.iter().rposition(|record| record.accepted).map_or(0, |place| place + 1);
     let rejected = &records[since..];
     let good = records[..since].iter().rev().find_map(|record| record.controller.model.clone());
@@ -117,7 +117,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     model_free(settings.stiffen.powi(before as i32))
 }
 
-/// Returns a further run for an additional motion after all conditions are met; `None` if no run has a model.
+/// Returns a further run, for an additional motion after all conditions are met; `None` if no run has a model.
 pub(crate) fn further(records: &[RunRecord], thresholds: &VerdictSettings) -> Option<RunPlan> {
     let model = most_trusted(records, thresholds).and_then(model_of)?;
     Some(RunPlan::with_model(records.len() + 1, model, 1.0))
@@ -142,9 +142,10 @@ fn helpless(record: &RunRecord, min_saturated_share: f64, names: &Names) -> Opti
     })
 }
 
-/// The run with the best estimate: the newest good run, unless its error bars are much wider than those of an earlier
-/// run, or a rejected run with clearly narrower error bars. Bad tracking indicates a bad model in the controller, not a
-/// bad estimate: a joint with large tracking errors may be excited better than one that hardly moves.
+/// The run with the best estimate. This is the newest good run, unless its error bars are much wider than those of an
+/// earlier run. A rejected run is used if its error bars are clearly narrower. Poor tracking indicates a bad model in
+/// the controller, not a bad estimate: a joint with large tracking errors can be excited better than a joint that
+/// hardly moves.
 fn most_trusted<'r>(records: &'r [RunRecord], thresholds: &VerdictSettings) -> Option<&'r RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
         let most = if record.accepted {
@@ -179,8 +180,8 @@ pub(crate) enum Rejection {
     TracksWorse { now: f64, then: f64 },
 }
 
-/// Accepts or rejects a run, given the runs before it. `following` is the tracking error of each joint above which it
-/// has left its trajectory.
+/// Accepts or rejects a run, given the previous runs. `following` is the tracking error of each joint above which the
+/// joint has left its trajectory.
 pub(crate) fn verdict(
     record: &RunRecord,
     before: &[RunRecord],
@@ -209,7 +210,7 @@ pub(crate) fn verdict(
     let Some(good) = before.iter().rev().find(is_comparable) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());
     let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
-    // The controller without a model is the fallback, so its tracking is not a reason to reject it.
+    // The controller without a model is the fallback, so a run with it is not rejected for its tracking.
     if settings.reject && record.controller.model.is_some() && now > worst {
         return Err(Rejection::TracksWorse { now, then });
     }
@@ -226,7 +227,8 @@ fn failed(record: &RunRecord) -> String {
     format!("run {} under {}: {reason}", record.run, record.controller.name)
 }
 
-/// Stiffness grows by `factor`, damping by its root, so the damping ratio is unchanged.
+/// Multiplies the stiffness by `factor` and the damping by its square root, so that the damping ratio does not
+/// change.
 fn stiffened(settings: &ControllerSettings, factor: f64) -> ControllerSettings {
     let times = |gains: &PerJoint, by: f64| match gains {
         PerJoint::All(gain) => PerJoint::All(by * gain),

@@ -18,7 +18,7 @@ pub struct UsedController {
     pub name: String,
     /// Its model; `None` for controllers without a model.
     pub model: Option<ModelParameters>,
-    /// Share of the step from the last good parameters to the new ones.
+    /// Share of the change from the last good parameters to the new parameters.
     pub damping: f64,
     /// Factor on the gains of a controller without a model.
     pub stiffness: f64,
@@ -30,50 +30,51 @@ pub struct UsedController {
 pub struct RunRecord {
     /// Number of the run, from 1.
     pub run: usize,
-    /// Its trajectories, if they differ from those of the task.
+    /// Trajectories of the run, if they differ from those of the task.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<RunMotion>,
-    /// Forecast for its motion; `None` without planned motions or before the first estimate.
+    /// Forecast for the motion of the run; `None` without planned motions or before the first estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forecast: Option<MotionForecast>,
-    /// Its controller.
+    /// Controller of the run.
     pub controller: UsedController,
     /// Whether every trajectory was completed.
     pub done: bool,
-    /// How it ended, in words.
+    /// Description of how the run ended.
     pub outcome: String,
     /// Largest distance of each joint from the reference, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// Whether the run is good.
+    /// Whether the run is good and its data are used.
     pub accepted: bool,
     /// Why the run was rejected, or why there is no estimate.
     pub reason: Option<String>,
-    /// Result of its rehearsal, if any.
+    /// Result of the rehearsal (simulation before the run), if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rehearsal: Option<Rehearsal>,
-    /// Result of the warm-up before it, if any.
+    /// Result of the warm-up before the run, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
     /// Estimate from this run alone, if any.
     pub estimate: Option<RunEstimate>,
-    /// Estimate from all good runs up to this one; `None` for the first run, for rejected runs, and if runs are not
-    /// pooled.
+    /// Estimate from all good runs up to this one together. `None` for the first run, for rejected runs, and if runs
+    /// are not fitted together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pooled: Option<RunEstimate>,
-    /// Evidence in its log; `None` if it was not completed, and in runs of earlier versions.
+    /// Evidence in the log; `None` if the run was not completed, and in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
-    /// Comparison of its logged torque with the commanded torque; `None` if too little was recorded, and in runs of
-    /// earlier versions.
+    /// Comparison of the logged with the commanded torque; `None` if too little was recorded, and in runs of earlier
+    /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_check: Option<TorqueCheck>,
-    /// The run of the held-out motion after it; stored in a separate folder.
+    /// The run of the held-out motion after this run; it is stored in a separate folder.
     #[serde(skip)]
     pub held_out: Option<HeldOutRun>,
 }
 
 impl RunRecord {
-    /// Checks that its arrays fit `robot` (with the selected friction); a file from outside may contain anything.
+    /// Checks that the lengths of all arrays agree with `robot` (with the selected friction), because a file from
+    /// outside can contain anything.
     pub(crate) fn check(&self, robot: &ParametricModel) -> Result<(), String> {
         let (joints, columns) = (robot.dof(), robot.layout().columns().len());
         let all = robot.model().inertial_count() + robot.terms().len();
@@ -127,7 +128,7 @@ impl RunRecord {
         Ok(())
     }
 
-    /// Reasons why its logged torque differs from the commanded torque; empty if it agrees or was not checked.
+    /// Reasons why the logged torque differs from the commanded torque; empty if it agrees or was not checked.
     pub fn torque_causes(&self) -> &[TorqueCause] {
         self.torque_check.as_ref().map_or(&[], |check| &check.causes)
     }
@@ -138,7 +139,7 @@ impl RunRecord {
         check.causes.is_empty() && check.joints.get(joint).is_some_and(|own| own.difference_percent.is_some())
     }
 
-    /// Returns the newest estimate: from all good runs, or else from this run alone.
+    /// Returns the newest estimate: from all good runs, otherwise from this run alone.
     pub fn knowledge(&self) -> Option<&RunEstimate> {
         self.pooled.as_ref().or(self.estimate.as_ref())
     }

@@ -14,41 +14,41 @@ pub struct NextMotion {
     pub controller: String,
     /// Whether the controller has a model.
     pub model_based: bool,
-    /// Length, s.
+    /// Duration, s.
     pub duration_s: f64,
     /// Share of the trajectory's speed; below 1 only in slow runs before the first run.
     pub speed: f64,
     /// Purpose of the motion.
     pub purpose: RunPurpose,
-    /// The largest velocity of each joint, by name, rad/s (m/s).
+    /// The largest velocity of each joint, with the joint's name, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
-    /// Result of its rehearsal, if any.
+    /// Result of the rehearsal (simulation of the motion before it is commanded), if any.
     pub rehearsal: Option<Rehearsal>,
-    /// The paths from and to home, if a home is set.
+    /// The paths from and to the home posture, if there is one.
     pub ways: Option<NextWays>,
 }
 
-/// The paths from and to home of a motion that is about to be commanded.
+/// The paths from the home posture to a motion and back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NextWays {
-    /// Length of the approach, s.
+    /// Duration of the approach, s.
     pub approach_s: f64,
-    /// Length of the return, s.
+    /// Duration of the return, s.
     pub return_s: f64,
-    /// The largest velocity of each joint on both paths, by name, rad/s (m/s).
+    /// The largest velocity of each joint on both paths, with the joint's name, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
-    /// Number of via postures of each path; 0 for a direct path.
+    /// Number of via postures of the approach and of the return; 0 for a direct path.
     pub over_postures: [usize; 2],
 }
 
-/// A motion that is commanded now, for an observer.
+/// A motion that begins now, for an observer.
 #[derive(Clone, Copy, Debug)]
 pub struct BegunMotion<'a> {
     /// The motion.
     pub motion: &'a NextMotion,
-    /// The trajectory, without the paths from and to home.
+    /// The trajectory, without the paths from and to the home posture.
     pub reference: &'a Reference,
-    /// Torque that the newest estimate predicts along it; `None` without an estimate.
+    /// Torque that the newest estimate predicts along the trajectory; `None` without an estimate.
     pub expected: Option<&'a ExpectedTorque>,
 }
 

@@ -1,4 +1,4 @@
-//! A running robot program: exchanges lines with time limits until it ends or is killed.
+//! A running robot program: exchanges lines with it, with time limits, until it ends or is killed.
 
 use super::RobotFault;
 use super::process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
@@ -13,13 +13,13 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Largest line, bytes: about ten times a sample of a thousand joints.
+/// Maximum length of a line, bytes: about ten times a sample of a thousand joints.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 const QUEUE_LINES: usize = 1024;
 const STDERR_TAIL_BYTES: usize = 2000;
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Capability of a program that runs the approach and return paths of a run.
+/// Name of the capability that a program runs the approach and return paths of a run.
 const HOME_CAPABILITY: &str = "home";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -65,9 +65,9 @@ pub(super) struct Client {
     waker: SyncSender<Event>,
     last_words: Arc<Mutex<Vec<u8>>>,
     limits: ProcessLimits,
-    /// Index of each joint of the model in the client's vectors.
+    /// Index in the program's vectors of each joint of the model.
     pub(super) places: Vec<usize>,
-    /// Torque per logged unit for each of the client's joints, Nm (N) per unit.
+    /// Torque per logged unit for each joint of the program, Nm (N) per unit.
     pub(super) torque_per_unit: Vec<f64>,
     pub(super) runs_ways: bool,
     run_ends: Option<(Instant, f64)>,
@@ -88,7 +88,7 @@ impl Client {
             program: program.name().to_owned(),
             reason: error.to_string(),
         })?;
-        // A bounded queue: a fast client waits, and memory does not grow.
+        // The queue is bounded: a program that is too fast waits, and memory does not grow.
         let (sender, events) = sync_channel(QUEUE_LINES);
         let waker = sender.clone();
         let child = group.program();
@@ -148,13 +148,13 @@ impl Client {
 
     pub(super) fn follow(&mut self, stop: Option<&StopSignal>) {
         let (waker, id) = (self.waker.clone(), self.group.id());
-        // A full queue is not empty, so the reader wakes anyway.
+        // If the queue is full, the reader wakes anyway.
         let wake = move || drop(waker.try_send(Event::Woken));
         self.listening = stop.map(|stop| stop.listen(Box::new(wake), Box::new(move || id.kill())));
         self.stop = stop.cloned();
     }
 
-    /// Sets the end of the run and its time limit, s.
+    /// Sets the end time of the run and its time limit, s.
     pub(super) fn limit_run(&mut self, run_ends: Option<(Instant, f64)>) {
         self.run_ends = run_ends;
     }
@@ -181,7 +181,7 @@ impl Client {
         sent.ok_or(()).map_err(|()| self.died(waiting_for))
     }
 
-    /// Sends a stop and reads until the client's end message, which confirms that the robot is at rest. Samples
+    /// Sends a stop and reads until the program's end message, which confirms that the robot is at rest. Samples
     /// received meanwhile are passed to `keep`.
     pub(super) fn stop(&mut self, reason: &str, keep: &mut dyn FnMut(ToHost)) -> Stopping {
         let stop = ToClient::Stop { reason: reason.to_owned() };
@@ -206,11 +206,11 @@ impl Client {
         Stopping::Unanswered
     }
 
-    /// Stops the client after a fault during a motion; `None` if no motion was running.
+    /// Stops the program after a fault during a motion; `None` if no motion was running.
     pub(super) fn stop_after(&mut self, fault: &RobotFault) -> Option<Stopping> {
         if let (RobotFault::Short { .. }, false) = (fault, self.moving) {
-            // The client reported the end of the run, so no answer is expected. If it still moves, it has the usual
-            // time to stop.
+            // The program reported the end of the run, so no answer is expected. If the robot still moves, the
+            // program has the usual time to stop it.
             let _ = self.send(&ToClient::Stop { reason: fault.to_string() }, "end");
             self.limits.bye_s = self.limits.bye_s.max(self.limits.stop_s);
             return Some(Stopping::Unknown);
@@ -237,8 +237,8 @@ impl Client {
             match self.events.recv_timeout(left.min(POLL_INTERVAL)) {
                 Ok(Event::Line(line)) => return self.heard(line).map(Received::Message),
                 Ok(Event::Closed) | Err(RecvTimeoutError::Disconnected) => return Err(self.died(waiting_for)),
-                // A child process may hold the pipe open. The last lines may still arrive after the program is first
-                // seen dead.
+                // A child process may hold the pipe open. The last lines can still arrive after the program was first
+                // seen to have ended.
                 Err(RecvTimeoutError::Timeout) if self.group.exit().is_some() => {
                     if seen_dead {
                         return Err(self.died(waiting_for));
@@ -264,7 +264,7 @@ impl Client {
     }
 
     fn died(&mut self, waiting_for: &'static str) -> RobotFault {
-        // Its output is closed: it has ended, is ending, or has closed the output deliberately.
+        // The program's output is closed: the program has ended, is ending, or has closed the output deliberately.
         let exit = self.group.exit_within(Duration::from_millis(500));
         let exit = exit.unwrap_or_else(|| "its standard output is closed".to_owned());
         // The reader thread may still be reading the last lines.
@@ -278,7 +278,7 @@ impl Client {
 impl Drop for Client {
     fn drop(&mut self) {
         if self.moving && !self.stop_sent {
-            // The run was abandoned during a motion: the program has to stop the robot.
+            // The run was abandoned during a motion, so the program has to stop the robot.
             let _ = self.send(&ToClient::Stop { reason: "the run was given up".to_owned() }, "end");
         }
         let _ = self.send(&ToClient::Bye {}, "end");

@@ -10,10 +10,10 @@ use dynident_simulation::controllers::Measured;
 use std::path::Path;
 use std::time::Instant;
 
-/// Largest ratio of recorded samples to samples of the reference.
+/// Maximum ratio of recorded samples to samples of the reference.
 const MAX_SAMPLE_RATIO: usize = 100;
 
-/// Mode `run`: the client runs the controller and streams its samples.
+/// Mode `run`: the robot program runs the controller and sends its samples.
 pub(super) fn run(
     client: &mut Client,
     request: &RunRequest<'_>,
@@ -31,7 +31,7 @@ pub(super) fn run(
     let mut stream = StreamWatch::new(client.silence_s());
     let whole_s = recorder.left_s();
     loop {
-        // Samples may be sent after the motion, so the remaining time of the run is added.
+        // Samples can arrive after the motion, so the remaining time of the run is added.
         let longest_s = client.message_s() + recorder.left_s();
         let silence_s = stream.limit_s().filter(|limit_s| *limit_s < longest_s && !recorder.is_at_end_of_part());
         let heard = client.next("sample", silence_s.unwrap_or(longest_s)).map_err(|fault| match (fault, silence_s) {
@@ -94,8 +94,8 @@ fn send_run(client: &mut Client, request: &RunRequest<'_>, joints: &[String], fo
     )
 }
 
-/// Stops the client if the newest sample leaves the envelope or the motion oscillates; returns the status of the run.
-/// `most` is the largest number of stored samples.
+/// Stops the program if the newest sample leaves the safety envelope or the motion oscillates; returns the status of
+/// the run. `most` is the maximum number of stored samples.
 fn stopped_if_unsafe(
     client: &mut Client,
     recorder: &mut Recorder<'_>,
@@ -114,7 +114,7 @@ fn stopped_if_unsafe(
 /// Reason in the stop message if a person requested the stop.
 const INTERRUPTED: &str = "interrupted";
 
-/// Stops a client. Samples that it still sends are stored while they are valid.
+/// Stops a program. Samples that it still sends are stored as long as they are valid.
 fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason: &str) -> Stopping {
     let order = (client.places.clone(), client.torque_per_unit.clone());
     let mut fine = true;
@@ -147,13 +147,13 @@ fn keep_sample(
     Ok(dq)
 }
 
-/// Mode `step`: the host runs the controller, sample by sample.
+/// Mode `step`: Dynident runs the controller, sample by sample.
 pub(super) fn steps(
     client: &mut Client,
     request: &RunRequest<'_>,
     recorder: &mut Recorder<'_>,
 ) -> Result<RobotStatus, RobotFault> {
-    // Already checked with the request.
+    // This was already checked with the request.
     let Ok(reference) = request.whole() else {
         return Ok(RobotStatus::Stopped {
             reason: "the paths from and to home do not belong to the motion".to_owned(),
@@ -207,7 +207,7 @@ pub(super) fn steps(
         record.q.extend(q);
         record.tau.extend_from_slice(&tau);
         record.samples += 1;
-        // Check before sending: a torque beyond the envelope is never sent.
+        // The check comes before sending: a torque beyond the safety envelope is never sent.
         if let Some(status) = stopped_if_unsafe(client, recorder, Some(&dq), 0) {
             return Ok(status);
         }
@@ -252,7 +252,7 @@ fn time(t_s: Option<f64>, sample: usize, before: Option<&f64>) -> Result<f64, Ro
     }
 }
 
-/// Sorts a client's vector into the model's order.
+/// Sorts a vector of the program into the order of the model's joints.
 fn vector(places: &[usize], values: &[Option<f64>], what: &'static str, sample: usize) -> Result<Vec<f64>, RobotFault> {
     let expected = places.len();
     if values.len() != expected {

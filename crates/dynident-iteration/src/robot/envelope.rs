@@ -6,21 +6,21 @@ use dynident_model::Model;
 use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError, require};
 use serde::{Deserialize, Serialize};
 
-/// Smallest distance of the positions from which speeds are computed if the robot does not measure them, s, for an arm
-/// of 1.2 m; differences of neighbouring quantised positions are too noisy.
+/// Minimum time between the positions from which velocities are computed if the robot does not measure them, s, for
+/// an arm of 1.2 m; differences of neighbouring quantised positions are too noisy.
 const SPEED_SPAN_S: f64 = 0.01;
 
-/// Default of the largest tracking error of a revolute joint, rad.
+/// Default limit of the tracking error of a revolute joint, rad.
 pub(crate) const TRACKING_RAD: f64 = 0.3;
-/// Default of the largest tracking error of a prismatic joint, m, for an arm of 1.2 m.
+/// Default limit of the tracking error of a prismatic joint, m, for an arm of 1.2 m.
 pub(crate) const TRACKING_M: f64 = 0.1;
 const SEARCH_MARGIN_PERCENT: f64 = 10.0;
 /// Factor on the velocity and effort limits of the robot description, for overshoot and sensor noise.
 const LIMIT_FACTOR: f64 = 1.1;
 
-/// Settings `[iteration.envelope]`. The defaults are the limits of the robot description (positions unchanged, velocity
-/// and effort increased by 10 %) and a tracking error of 0.3 rad (0.1 m). Each value is one number for all joints or a
-/// list.
+/// Settings `[iteration.envelope]`: limits of every sample of a run. The defaults are the limits of the robot
+/// description (positions unchanged, velocity and effort increased by 10 %) and a tracking error of 0.3 rad (0.1 m).
+/// Each value is one number for all joints or a list with one number per joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -40,22 +40,24 @@ pub struct EnvelopeSettings {
     /// Largest tracking error, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<PerJoint>,
-    /// Box in the base frame that no link origin may leave; default none.
+    /// Box in the base frame that no link origin and no tool point may leave; default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceSettings>,
-    /// Margin that motion searches keep inside the envelope, percent: of the allowed tracking error for positions and
-    /// the workspace (times the lever arm), of the limit for a stated velocity or torque. Default 10.
+    /// Margin, in percent, that motion searches keep inside the envelope. For positions and the workspace it is a
+    /// percentage of the allowed tracking error (in the workspace times the lever arm); for a velocity or torque
+    /// limit given here, of this limit. Default 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_margin_percent: Option<f64>,
 }
 
 impl EnvelopeSettings {
-    /// Margin that motion searches keep inside the envelope, as a share.
+    /// Margin that motion searches keep inside the envelope, as a share from 0 to 1.
     pub fn search_margin(&self) -> f64 {
         0.01 * self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT)
     }
 
-    /// Returns the envelope of a robot: stated values, else the limits of the robot description, else the defaults.
+    /// Returns the envelope of a robot: given values, otherwise the limits of the robot description, otherwise the
+    /// defaults.
     ///
     /// # Errors
     /// Lists of a wrong length, limits that are not positive, positions that are not finite.
@@ -90,7 +92,7 @@ impl EnvelopeSettings {
     }
 }
 
-/// Limits of every sample of a run, joint by joint in the model's order; `None` if unknown.
+/// Safety envelope: limits of every sample of a run, joint by joint in the model's order; `None` if unknown.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Envelope {
     /// Lowest position, rad (m).
@@ -103,16 +105,16 @@ pub struct Envelope {
     pub torque: Vec<Option<f64>>,
     /// Largest tracking error, rad (m).
     pub tracking_error: Vec<Option<f64>>,
-    /// Region of the cell in which the robot may be.
+    /// Region of the workspace in which the robot may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceBox>,
-    /// Smallest distance of the positions from which speeds are computed, s.
+    /// Minimum time between the positions from which velocities are computed, s.
     #[serde(skip)]
     pub speed_span_s: f64,
 }
 
 impl Envelope {
-    /// Returns the envelope with joint `j` at `places[j]`.
+    /// Returns the envelope with joint `j` moved to index `places[j]`.
     pub(super) fn in_order(&self, places: &[usize]) -> Self {
         let sorted = |values: &[Option<f64>]| {
             let mut out = vec![None; values.len()];
@@ -132,10 +134,10 @@ impl Envelope {
         }
     }
 
-    /// Sets the limits of a simulated run that are not stated. The simulator saturates torques; the other limits stop
-    /// the run.
+    /// Sets those limits of a simulated run that are not yet set. The simulator saturates torques; the other limits
+    /// stop the run.
     pub(crate) fn limit(&self, limits: &mut RunLimits) {
-        // JSON has no infinity, so the largest number is used.
+        // JSON cannot represent infinity, so the largest number is used.
         let each = |values: &[Option<f64>], none: f64| {
             Some(PerJoint::Each(values.iter().map(|value| value.unwrap_or(none)).collect()))
         };
@@ -154,7 +156,7 @@ impl Envelope {
         }
     }
 
-    /// Returns the breach of the envelope if the motion is followed without error, if any.
+    /// Returns the violation of the envelope by a motion that is followed without tracking error, if any.
     pub fn broken_by(&self, reference: &Reference, names: &[String]) -> Option<Breach> {
         let motion = reference.motion();
         let outside = self.workspace.as_ref().and_then(|own| own.broken_by(reference));
@@ -174,7 +176,7 @@ impl Envelope {
         Some(own.breach(sample as f64 / rate_hz))
     }
 
-    /// Returns the breach of the torque limits, if any.
+    /// Returns the violation of the torque limits, if any.
     pub fn torque_breach(&self, tau: &[f64], names: &[String], time_s: f64) -> Option<Breach> {
         (0..tau.len()).find_map(|joint| Some(self.of_torque(joint, tau[joint])?.breach(names, time_s)))
     }
@@ -230,9 +232,9 @@ pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64
 pub(super) struct EnvelopeWatch<'a> {
     envelope: Option<&'a Envelope>,
     reference: &'a Reference,
-    /// Index of the sample from which speeds are computed.
+    /// Index of the sample from which velocities are computed.
     from: usize,
-    /// Workspace for the link positions.
+    /// Scratch memory for the positions of links.
     arrays: Option<Arrays>,
 }
 
@@ -242,8 +244,8 @@ impl<'a> EnvelopeWatch<'a> {
         Self { envelope, reference, from: 0, arrays }
     }
 
-    /// Returns the breach of the envelope at the last sample of a record, if any. The record's arrays are sample-major;
-    /// `dq` are measured velocities, if available.
+    /// Returns the violation of the envelope by the last sample of a record, if any. The record's arrays are
+    /// sample-major; `dq` are measured velocities, if available.
     pub(super) fn look(&mut self, record: &Record, dq: Option<&[f64]>) -> Option<Breach> {
         let envelope = self.envelope?;
         let (joints, last) = (record.joints.len(), record.samples.checked_sub(1)?);
@@ -272,7 +274,7 @@ impl<'a> EnvelopeWatch<'a> {
         Some(own.breach(arrays, &record.q[last * joints..(last + 1) * joints])?.breach(time_s))
     }
 
-    /// Returns the first breach in a complete joint-major record, for logs that arrive after the run.
+    /// Returns the first violation in a complete joint-major record, for logs that arrive after the run.
     pub(super) fn first(envelope: Option<&Envelope>, reference: &Reference, record: &Record) -> Option<Breach> {
         envelope?;
         let mut watch = EnvelopeWatch::new(envelope, reference);

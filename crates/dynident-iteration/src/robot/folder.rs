@@ -24,17 +24,17 @@ const MAX_STOPPED_BYTES: u64 = 1 << 20;
 pub struct FolderSettings {
     /// The folder of the experiment; every run has a folder `run_k` in it.
     pub folder: PathBuf,
-    /// How long to wait for a log, s. Default 0: check once.
+    /// Time to wait for a log, s. Default 0: the folder is checked once.
     #[serde(default)]
     pub wait_s: f64,
     /// Additional formats of each motion: `"ros2"`, `"urscript"`, `"waypoints"`, `"torque"`, `"current"`. Default none;
     /// `trajectory.csv` and `controller.json` are always written.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forms: Vec<FolderForm>,
-    /// Rate of the URScript program, Hz: 125 for CB-series, 500 for e-series. Default 125.
+    /// Rate of the URScript program, Hz: 125 for CB-series robots, 500 for e-Series robots. Default 125.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urscript_rate_hz: Option<f64>,
-    /// Joint torque per ampere, Nm/A (N/A), including the gear: one number or one per joint. It is used for
+    /// Joint torque per ampere, Nm/A (N/A), including the gear: one number, or one per joint. It converts torques to
     /// `current.csv`, and allows logs with currents `i1..` in A instead of `tau1..`. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_constants: Option<PerJoint>,
@@ -69,22 +69,22 @@ impl FolderSettings {
     }
 }
 
-/// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and writes `run_k/log.csv`
-/// (`t_s, q1.., tau1..`). If the robot was stopped early, `run_k/stopped.txt` contains the reason, and the log may be
-/// shorter.
+/// A robot that a person operates through a folder. The person finds `run_k/trajectory.csv` and
+/// `run_k/controller.json` there, runs the trajectory, and writes `run_k/log.csv` (`t_s, q1.., tau1..`). If the robot
+/// was stopped early, the person writes the reason to `run_k/stopped.txt`, and the log may be shorter.
 ///
-/// A log is read when it is complete: its last line is terminated, and it reaches the end of the trajectory. Unchanged
-/// files are not written again. If the files of a run change although a log exists, the log belongs to another run and
-/// is rejected. The paths from and to home are in `approach.csv` and `return.csv`; their logs `approach_log.csv` and
-/// `return_log.csv` are checked if they exist.
+/// A log is read when it is complete: its last line ends with a newline, and it reaches the end of the trajectory.
+/// Files that have not changed are not written again. If the files of a run change although a log exists, the log
+/// belongs to another run and is rejected. The paths from and to the home posture are in `approach.csv` and
+/// `return.csv`; their logs `approach_log.csv` and `return_log.csv` are checked if they exist.
 ///
-/// Each log is first compared with the motion ([`examine_log`]): wrong units, signs, columns or time stamps are
+/// Each log is first compared with the motion ([`examine_log`]). Wrong units, signs, columns or time stamps are
 /// reported, and the run waits for the corrected file. If a log is corrected later, the next call reads it again.
 #[derive(Debug)]
 pub struct FolderRobot {
     settings: FolderSettings,
     forms: FormSettings,
-    /// Model for the torque check before a run has provided one.
+    /// Model for the torque check until a run provides one.
     prior: Option<ControllerModel>,
     joints: Vec<String>,
     name: String,
@@ -103,7 +103,7 @@ impl FolderRobot {
         Ok(Self { settings, forms, prior: None, joints, name })
     }
 
-    /// Sets the model that predicts torques if the controller has none, to check the unit of recorded torques.
+    /// Sets the model that predicts torques to check the unit of recorded torques, for a controller without a model.
     #[must_use]
     pub fn with_prior(mut self, prior: Option<ControllerModel>) -> Self {
         self.prior = prior;
@@ -176,7 +176,7 @@ impl FolderRobot {
         };
         let ways = self.way_records(request, folder)?;
         let stopped = dynident_files::read_text(&folder.join("stopped.txt"), MAX_STOPPED_BYTES).ok();
-        // The log of a stopped run follows only a part of the motion, so it is not compared with it.
+        // The log of a stopped run contains only a part of the motion, so it is not compared with the motion.
         let ExaminedLog { record, note, mistakes } = match &stopped {
             Some(_) => ExaminedLog { record, note: None, mistakes: Vec::new() },
             None => self.examined(record, request.reference, request.model),
@@ -245,7 +245,7 @@ impl Robot for FolderRobot {
         // A missing or incomplete file is not a correction.
         let Ok(record) = self.read(&path, reference.rate_hz()) else { return false };
         let same = |found: &Record| (&found.times_s, &found.q, &found.tau) == (&kept.times_s, &kept.q, &kept.tau);
-        // Only the clock may have been changed before the record was stored.
+        // Only the time stamps may have been changed before the record was stored.
         !same(&record) && !same(&self.examined(record, reference, None).record)
     }
 

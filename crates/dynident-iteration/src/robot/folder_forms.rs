@@ -26,7 +26,7 @@ pub enum FolderForm {
     Waypoints,
     /// `torque.csv`: time and the model torque, Nm (N), for a controller with feed-forward.
     Torque,
-    /// `current.csv`: the same as currents, A, by `torque_constants`.
+    /// `current.csv`: time and the model torque as currents, A, computed with `torque_constants`.
     Current,
 }
 
@@ -34,12 +34,12 @@ pub enum FolderForm {
 pub(super) struct FormSettings {
     pub(super) forms: Vec<FolderForm>,
     pub(super) urscript_rate_hz: f64,
-    /// Torque per ampere, Nm/A (N/A), joint by joint.
+    /// Torque per ampere of each joint, Nm/A (N/A).
     pub(super) torque_constants: Option<Vec<f64>>,
 }
 
-/// Writes the formats of a run's motion and of the paths from and to home into its folder. Torque files are omitted
-/// without a model.
+/// Writes the formats of a run's motion, and of the paths from and to the home posture, into the run's folder. Torque
+/// files are omitted without a model.
 pub(super) fn write_forms(
     request: &RunRequest<'_>,
     joints: &[String],
@@ -54,7 +54,7 @@ pub(super) fn write_forms(
             let fault = |error: ExportError| RobotFault::File { path: path.clone(), reason: error.to_string() };
             match text.map_err(fault)? {
                 Some(text) => write_atomically(&path, &text)?,
-                // Remove the file of an earlier call whose controller had a model.
+                // Removes the file of an earlier call whose controller had a model.
                 None if path.exists() => {
                     let fault =
                         |error: std::io::Error| RobotFault::File { path: path.clone(), reason: error.to_string() };
@@ -67,7 +67,7 @@ pub(super) fn write_forms(
     Ok(())
 }
 
-/// File names as in `design`; those of the paths have a prefix.
+/// File names as in `design`; file names of approach and return paths have a prefix.
 fn file_name(part: &str, form: FolderForm) -> String {
     let table = |name: &str| if part == "trajectory" { name.to_owned() } else { format!("{part}_{name}") };
     match form {
@@ -105,7 +105,7 @@ fn text(
     }
 }
 
-/// The motion at a rate, by linear interpolation; the last time is the end of the motion.
+/// The motion at another sampling rate, by linear interpolation; the last time is the end of the motion.
 fn sampled(reference: &Reference, rate_hz: f64) -> (Vec<f64>, Motion) {
     let own = reference.motion();
     let duration_s = reference.duration_s();
@@ -131,7 +131,7 @@ fn sampled(reference: &Reference, rate_hz: f64) -> (Vec<f64>, Motion) {
     (times_s, motion)
 }
 
-/// `t_s` and the model torque of every joint, divided by its torque constant if there is one.
+/// Table of `t_s` and the model torque of every joint, divided by the joint's torque constant if there is one.
 fn torque_csv(reference: &Reference, model: &ControllerModel, prefix: &str, constants: Option<&[f64]>) -> String {
     let mut text = String::from("t_s");
     for joint in 1..=reference.joints() {

@@ -8,8 +8,8 @@ use super::{
 use dynident_simulation::controllers::{Controller, Measured};
 use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
 
-/// A controlled run, with which a function drives its robot. The function requests the torque of each sample, and the
-/// samples form the record.
+/// A controlled run, with which a user's function drives its robot. The function requests the torque of each sample,
+/// and the samples form the record.
 #[derive(Debug)]
 pub struct ControlledRun {
     run: usize,
@@ -20,30 +20,31 @@ pub struct ControlledRun {
     stop: Option<StopSignal>,
     target: ReferenceSample,
     tau: Vec<f64>,
-    /// Samples before the motion and in the motion, if the run has paths from and to home.
+    /// Numbers of samples before the motion and in the motion, if the run has paths from and to the home posture.
     parts: Option<[usize; 2]>,
     /// Time of the first sample by the robot's clock, s.
     first_s: Option<f64>,
     /// Record of the whole run, by the robot's clock from its first sample.
     record: Record,
-    /// The newest sample, for the check of the envelope.
+    /// The newest sample, on which the envelope is checked.
     now: Record,
     end: Option<RunEnd>,
 }
 
-/// Longest step between two samples, periods. A longer one is a clock in another unit: milliseconds are a thousand
-/// times too long.
+/// Longest step between two samples, in sampling periods. A longer step indicates a clock with another unit: with
+/// milliseconds, the steps are a thousand times too long.
 const MAX_STEP_PERIODS: f64 = 500.0;
 
 /// Why a function ended its run early.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FunctionStop {
-    /// The robot stopped, for example by a protective stop. The run counts if it has begun.
+    /// The robot stopped, for example by a protective stop. The run is evaluated if it has begun.
     Robot {
         /// The reason.
         reason: String,
     },
-    /// The function failed, for example the driver of the robot. The run does not count; the next call repeats it.
+    /// The function failed, for example in the driver of the robot. The run is not evaluated; the next call repeats
+    /// it.
     Function {
         /// The reason.
         reason: String,
@@ -90,7 +91,8 @@ impl ControlledRun {
         self.run
     }
 
-    /// The motion to follow, including the paths from and to home; the robot starts at its first sample.
+    /// The motion to follow, including the paths from and to the home posture; the robot must start at its first
+    /// sample.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
@@ -101,15 +103,15 @@ impl ControlledRun {
     }
 
     /// Returns the drive torques, Nm (N), for the next sample, given the position `q` (rad, m) and the velocity `dq`
-    /// (rad/s, m/s) at `time_s` (s, by the robot's clock). Returns `None` if the robot has to be stopped at once: the
-    /// sample is outside of the envelope, a joint oscillates, a stop was requested, a value is not finite, or the run
-    /// is complete. The function then returns.
+    /// (rad/s, m/s) at `time_s` (s, by the robot's clock). Returns `None` if the robot has to be stopped immediately:
+    /// the sample is outside the envelope, a joint oscillates, a stop was requested, a value is not finite, or the
+    /// run is complete. The function must then return.
     pub fn torque(&mut self, time_s: f64, q: &[f64], dq: &[f64]) -> Option<&[f64]> {
         let sample = self.record.samples;
         if self.end.is_some() || sample >= self.reference.samples() {
             return None;
         }
-        // The robot's clock may begin at any time.
+        // The robot's clock can begin at any time.
         let time_s = time_s - *self.first_s.get_or_insert(time_s);
         if let Err(end) = self.check_sample(sample, time_s, q, dq) {
             self.end = Some(end);
@@ -126,7 +128,7 @@ impl ControlledRun {
         self.record.q.extend_from_slice(q);
         self.record.tau.extend_from_slice(&self.tau);
         self.record.samples += 1;
-        // Check before returning: a torque beyond the envelope is never returned.
+        // The check comes before the return: a torque beyond the envelope is never returned.
         self.now.times_s[0] = time_s;
         self.now.q.copy_from_slice(q);
         self.now.tau.copy_from_slice(&self.tau);
@@ -146,7 +148,7 @@ impl ControlledRun {
         Some(&self.tau)
     }
 
-    /// Why the last call of [`torque`](Self::torque) returned `None`, in words; `None` while the run continues.
+    /// Description of why the last call of [`torque`](Self::torque) returned `None`; `None` while the run continues.
     pub fn end_reason(&self) -> Option<String> {
         match &self.end {
             Some(RunEnd::Interrupted) => Some("a stop was requested".to_owned()),
@@ -158,7 +160,7 @@ impl ControlledRun {
         }
     }
 
-    /// The part of a sample, and the sample at which the time of this part is zero.
+    /// The part of the run to which a sample belongs, and the sample at which the time of this part is zero.
     fn part_of(&self, sample: usize) -> (RunPart, usize) {
         match self.parts {
             Some([before, _]) if sample < before => (RunPart::Approach, 0),
@@ -240,9 +242,9 @@ impl ControlledRun {
     }
 }
 
-/// A robot that is a function of this process. The function receives the controlled run, moves the robot to the first
-/// sample of the reference, requests and applies a torque at every sample, and returns after the last sample. If it
-/// returns an error, the run ends with that reason ([`FunctionStop`]).
+/// A robot that is a function of this process. The function receives the controlled run and moves the robot to the
+/// first sample of the reference. It then requests and applies a torque at every sample, and returns after the last
+/// sample. If it returns an error, the run ends with that reason ([`FunctionStop`]).
 pub struct FunctionRobot<F> {
     joints: Vec<String>,
     function: F,
@@ -252,8 +254,8 @@ impl<F> FunctionRobot<F>
 where
     F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
-    /// Creates a robot with these joints, in the model's order. The function returns the run with its outcome, so that
-    /// the run can be passed to another language meanwhile.
+    /// Creates a robot with these joints, in the model's order. The function returns the run together with its
+    /// outcome, so that the run can be passed to another language during the call.
     pub fn new(joints: Vec<String>, function: F) -> Self {
         Self { joints, function }
     }

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// Name and version of the schema of `controller.json`.
 pub const CONTROLLER_SCHEMA: &str = "dynident/controller/1";
 
-/// Returns the reference as a table `t_s, q1.., dq1.., ddq1..`, with the model torques `tau1..` along it if there is a
-/// model: a feed-forward for controllers without a model.
+/// Returns the reference as a table `t_s, q1.., dq1.., ddq1..`. If there is a model, the table also has the model
+/// torques `tau1..` along the reference: a feed-forward for controllers without a model.
 pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) -> String {
     let joints = reference.joints();
     let mut text = String::from("t_s");
@@ -53,8 +53,8 @@ pub(super) fn model_torques<'a>(
     })
 }
 
-/// Returns the controller's settings, the order of joints, the envelope and the model parameters: enough to compute the
-/// controller's torque elsewhere.
+/// Returns the controller's settings, the order of joints, the envelope and the model parameters as JSON. This is
+/// sufficient to compute the controller's torque in another program.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
     let mut file = json!({
         "schema": CONTROLLER_SCHEMA,
@@ -89,7 +89,7 @@ fn model_json(model: &ControllerModel) -> Value {
                 "axis": joint.axis.0,
                 "inertial": inertial.0,
             });
-            // Only for a dependent joint: `q = Σ multiplier q_joint + offset`.
+            // Only for a joint that follows others: `q = Σ multiplier q_joint + offset`.
             if let Some(coupling) = robot.coupling()
                 && !coupling.driving().contains(&place)
             {
@@ -111,8 +111,8 @@ fn model_json(model: &ControllerModel) -> Value {
     })
 }
 
-/// The model for the torques in the tables: `None` if the drives' position loop only uses the path. A program adds the
-/// torques if a table contains them.
+/// The model for the torques in the tables. It is `None` if the drives' position loop receives only the path, because
+/// a program adds the torques of a table as feed-forward.
 fn fed_forward<'a>(request: &RunRequest<'a>) -> Option<&'a ControllerModel> {
     let path_alone = matches!(request.controller, ControllerSettings::PositionLoop(own) if !own.feed_forward);
     request.model.filter(|_| !path_alone)
@@ -133,7 +133,7 @@ pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) 
     Ok([trajectory.0, controller.0])
 }
 
-/// Writes `approach.csv` and `return.csv` into a folder, if the request has paths from and to home.
+/// Writes `approach.csv` and `return.csv` into a folder, if the request has paths from and to the home posture.
 pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Option<[PathBuf; 2]>, RobotFault> {
     let Some(ways) = request.ways else { return Ok(None) };
     let paths = ["approach.csv", "return.csv"].map(|name| folder.join(name));
@@ -143,8 +143,8 @@ pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Opti
     Ok(Some(paths))
 }
 
-/// Returns the first existing file that differs from this request. The envelope and the paths from and to home are
-/// ignored.
+/// Returns the first existing file whose content differs from this request. Differences in the envelope and in the
+/// paths from and to the home posture are ignored.
 pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
     let same = |there: &str, text: &str| there == text || of_the_run(there) == of_the_run(text);
     let differs = |(path, text): &(PathBuf, String)| {
@@ -153,7 +153,7 @@ pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) 
     Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
 }
 
-/// A controller's file without envelope and paths; `Err` with the text if it is not a JSON object.
+/// Content of a controller file without envelope and paths; `Err` with the text if it is not a JSON object.
 fn of_the_run(text: &str) -> Result<Value, &str> {
     let Ok(Value::Object(mut file)) = serde_json::from_str(text) else { return Err(text) };
     file.remove("envelope");

@@ -1,26 +1,26 @@
-//! Detects torque that does not respond while a joint leaves its trajectory: an indication of drive saturation in the
-//! log of a stopped run.
+//! Detects torque that does not respond while a joint leaves its trajectory. In the log of a stopped run this
+//! indicates drive saturation.
 
 use super::envelope::target_at;
 use dynident_simulation::{Record, Reference};
 
-/// Share of the final tracking error; the analysed interval begins when the error last was below it.
+/// The analysed interval begins when the tracking error was last below this share of its final value.
 const BEGIN_ERROR_SHARE: f64 = 0.5;
-/// Largest relative difference of the torques in both halves of the interval for which the torque has not responded
-/// (the tracking error has doubled).
+/// The torque has not responded if the torques in both halves of the interval differ by at most this ratio (while the
+/// tracking error has doubled).
 const MAX_TORQUE_CHANGE: f64 = 0.1;
-/// Number of standard deviations within which noise may hide a response.
+/// Number of standard deviations of the noise within which a response may be hidden.
 const NOISE_SIGMAS: f64 = 2.0;
 const MIN_SAMPLES: usize = 8;
 
-/// A joint's torque while its tracking error doubled.
+/// Torque of a joint while its tracking error doubled.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HeldTorque {
     joint: String,
     /// Mean torque, Nm (N).
     torque: f64,
     duration_s: f64,
-    /// Tracking error at the begin and at the end, rad (m).
+    /// Tracking error at the beginning and at the end of the interval, rad (m).
     distances: [f64; 2],
 }
 

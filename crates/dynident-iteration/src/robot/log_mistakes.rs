@@ -1,7 +1,8 @@
-//! Mistakes in a recording that follow from a comparison with the commanded motion: units, signs, columns, time stamps.
+//! Mistakes in a recording, found by comparison with the commanded motion: units, signs, columns, time stamps.
 //!
-//! The clock is determined first, by the correlation of recorded and commanded positions, which is independent of unit,
-//! offset and sign. Positions are then compared joint by joint, and torques with those of a model along the motion.
+//! The relation of the time stamps to the motion is determined first, by the correlation of recorded and commanded
+//! positions, which is independent of unit, offset and sign. Positions are then compared joint by joint, and torques
+//! with the torques of a model along the motion.
 
 use super::envelope::target_at;
 use core::fmt;
@@ -10,15 +11,16 @@ use dynident_simulation::{Record, Reference};
 /// Thresholds for mistakes in a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogMistakeSettings {
-    /// Smallest correlation of recorded with commanded positions for a reliable comparison. Default 0.95: apart from
+    /// Minimum correlation of recorded with commanded positions for a reliable comparison. Default 0.95: apart from
     /// delay and scale, the tracking error is then a third of the motion's standard deviation (`1/√(1 + 0.33²)`).
     pub min_correlation: f64,
-    /// Largest delay that the robot may cause, s; up to this value, time stamps are not changed. Default 0.25.
+    /// Longest delay that the robot can cause, s; for shorter delays, time stamps are not changed. Default 0.25.
     pub max_lag_s: f64,
-    /// Largest relative deviation of a ratio from that of a unit. Default 0.15.
+    /// Largest relative deviation of a ratio from the ratio of two units. Default 0.15.
     pub ratio_tolerance: f64,
-    /// Ratio of recorded to predicted torque of every joint above which the unit is wrong (or below its inverse).
-    /// Default 300: errors of a robot description are much smaller, and a factor of 1000 is detected for any robot.
+    /// The torque unit is wrong if the ratio of recorded to predicted torque of every joint is above this value (or
+    /// below its reciprocal). Default 300: errors of a robot description are much smaller, and a factor of 1000 is
+    /// detected for any robot.
     pub torque_ratio: f64,
 }
 
@@ -36,26 +38,26 @@ pub enum LogMistake {
     TimeUnit {
         /// Name of the unit.
         unit: &'static str,
-        /// Its length in seconds.
+        /// Length of the unit in seconds.
         seconds: f64,
     },
     /// Positions in another unit.
     PositionUnit {
-        /// The joints.
+        /// Names of the joints.
         joints: Vec<String>,
-        /// Ratio of recorded to commanded range.
+        /// Ratio of the recorded to the commanded range of positions.
         ratio: f64,
-        /// The unit.
+        /// Likely unit.
         unit: &'static str,
     },
-    /// Positions with the other sign.
+    /// Positions with the opposite sign.
     PositionSign {
-        /// The joints.
+        /// Names of the joints.
         joints: Vec<String>,
     },
-    /// Position columns that contain other joints.
+    /// Position columns that contain the motion of other joints.
     ExchangedPositions {
-        /// For each column, the joint of its name and the joint whose motion it contains.
+        /// For each column, the joint in its name and the joint whose motion it contains.
         columns: Vec<(String, String)>,
     },
     /// Torques in another unit.
@@ -103,9 +105,9 @@ impl fmt::Display for LogMistake {
 /// A recording after the comparison with its motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExaminedLog {
-    /// The recording, on the motion's clock.
+    /// The recording, with times relative to the start of the motion.
     pub record: Record,
-    /// Change of the time stamps in words; `None` if they are used as they are.
+    /// Description of the change of the time stamps; `None` if they were not changed.
     pub note: Option<String>,
     /// Mistakes that have to be corrected in the file.
     pub mistakes: Vec<LogMistake>,
@@ -113,7 +115,7 @@ pub struct ExaminedLog {
 
 /// Units of time stamps, and their length in seconds.
 const TIME_UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
-/// Units of positions, and their number per radian (metre).
+/// Units of positions, and the number of units per radian (metre).
 const POSITION_UNITS: [(&str, f64); 4] = [
     ("degrees", 180.0 / core::f64::consts::PI),
     ("milliradians or millimetres", 1000.0),
@@ -121,22 +123,22 @@ const POSITION_UNITS: [(&str, f64); 4] = [
     ("converted from degrees although they were radians", core::f64::consts::PI / 180.0),
 ];
 
-/// Largest numbers of compared points and of tried delays.
+/// Maximum number of compared points, and of tested delays.
 const MAX_POINTS: usize = 300;
 const MAX_DELAYS: usize = 4000;
-/// Largest share of the motion that may be missing in a recording.
+/// Largest share of the motion that can be missing in a recording.
 const MAX_MISSING_SHARE: f64 = 0.01;
-/// Range of a joint below which its motion is not compared, as a share of the largest range.
+/// A joint is not compared if its range is below this share of the largest range of a joint.
 const MIN_RANGE_SHARE: f64 = 0.01;
-/// Difference below which two correlations are equal.
+/// Difference below which two correlations are treated as equal.
 const CORRELATION_TOLERANCE: f64 = 0.01;
 
 /// Compares a recording with the commanded motion. `torque` contains the model torque at every sample of the reference,
 /// joint by joint, if there is a model.
 ///
-/// A constant offset of the time stamps and an early start of the recorder are removed, because they do not affect the
-/// result. Other mistakes are reported and not corrected. A recording that does not resemble the motion is returned
-/// unchanged, without a mistake.
+/// A constant offset of the time stamps and an early start of the recorder are corrected, because they do not affect
+/// the result. Other mistakes are reported and not corrected. A recording that does not resemble the motion is
+/// returned unchanged, without a mistake.
 pub fn examine_log(
     record: Record,
     reference: &Reference,
@@ -162,7 +164,7 @@ pub fn examine_log(
     ExaminedLog { record, note, mistakes }
 }
 
-/// Relation of the time stamps to the motion: motion time = stamp · seconds − start.
+/// Relation of the time stamps to the motion: time in the motion = stamp · seconds − start.
 struct Clock {
     seconds: f64,
     start_s: f64,
@@ -172,7 +174,7 @@ struct Clock {
 }
 
 impl Clock {
-    /// Returns the recording on the motion's clock, with a note about the change.
+    /// Returns the recording with times relative to the start of the motion, and a note about the change.
     fn applied(&self, mut record: Record, reference: &Reference) -> (Record, Option<String>) {
         if self.start_s == 0.0 {
             return (record, None);
@@ -197,7 +199,7 @@ impl Clock {
     }
 }
 
-/// The motion at some points, joint by joint, and the indices of the moving joints.
+/// The commanded motion at some times, joint by joint, and the indices of the joints that move.
 struct Comparison<'a> {
     reference: &'a Reference,
     times_s: Vec<f64>,
@@ -227,7 +229,8 @@ impl<'a> Comparison<'a> {
         self.times_s.iter().map(|time| interpolated(&record.times_s, own, (time + start_s) / seconds)).collect()
     }
 
-    /// Mean over the moving joints of the largest absolute correlation with the commanded motion of any joint.
+    /// Mean over the moving joints of the largest absolute correlation between a recorded position and the commanded
+    /// motion of any joint.
     fn correlation(&self, record: &Record, seconds: f64, start_s: f64) -> f64 {
         let best = |&joint: &usize| {
             let own = self.recorded(record, joint, seconds, start_s);
@@ -237,8 +240,8 @@ impl<'a> Comparison<'a> {
         self.moving.iter().map(best).sum::<f64>() / self.moving.len() as f64
     }
 
-    /// Finds the clock with the largest correlation, for time stamps in a unit of `seconds`; `None` if the recording is
-    /// then shorter than the motion.
+    /// Finds the relation of the time stamps with the largest correlation, for stamps in a unit of `seconds`; `None`
+    /// if the recording would then be shorter than the motion.
     fn clock(&self, record: &Record, seconds: f64, settings: &LogMistakeSettings) -> Option<Clock> {
         let duration_s = self.reference.duration_s();
         let (first, last) = (record.times_s[0] * seconds, record.times_s[record.samples - 1] * seconds);
@@ -248,7 +251,7 @@ impl<'a> Comparison<'a> {
         if latest < earliest {
             return None;
         }
-        // The step is a small part of the fastest motion's period; long recordings use larger steps.
+        // The step is a small part of the shortest period of the motion; long recordings use larger steps.
         let step = (duration_s / MAX_POINTS as f64).min(0.02).max((latest - earliest) / MAX_DELAYS as f64);
         let steps = ((latest - earliest) / step).ceil() as usize;
         let at = |start_s: f64| self.correlation(record, seconds, start_s);
@@ -256,8 +259,8 @@ impl<'a> Comparison<'a> {
         let best = coarse.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let fine = (-10..=10).map(|k| best.1 + step * f64::from(k) / 10.0);
         let (correlation, start_s) = fine.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // Prefer unchanged time stamps, then those of a recording that begins with the motion: the robot itself may
-        // lag.
+        // Unchanged time stamps are preferred, then those of a recording that begins with the motion: the robot
+        // itself can lag behind the motion.
         let covers = |start: f64| start >= earliest && start <= latest;
         let is_equivalent = |start: f64| {
             covers(start)
@@ -284,7 +287,7 @@ impl<'a> Comparison<'a> {
             let of = |other: usize| correlation(&own, &self.targets[other]);
             let likest = self.moving.iter().copied().max_by(|&a, &b| of(a).abs().total_cmp(&of(b).abs()));
             let Some(holds) = likest.filter(|&other| of(other).abs() >= settings.min_correlation) else { continue };
-            // Several joints may have the same commanded motion.
+            // Several joints can have the same commanded motion.
             let holds = if of(joint).abs() >= of(holds).abs() - CORRELATION_TOLERANCE { joint } else { holds };
             if holds != joint {
                 exchanged.push((name(joint), name(holds)));
@@ -317,7 +320,7 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// Reports a wrong torque unit: the torques of all joints differ from the prediction by the same large factor.
+/// Reports a wrong torque unit if the torques of all joints differ from the prediction by the same large factor.
 /// `predicted` contains the torques at the reference's samples, joint by joint.
 fn torque_unit(
     record: &Record,
@@ -342,7 +345,7 @@ fn torque_unit(
         let at = |k: usize| (k as f64 / reference.rate_hz() + clock.start_s) / clock.seconds;
         let recorded: Vec<f64> = (0..samples).map(|k| interpolated(&record.times_s, own, at(k))).collect();
         let product: f64 = recorded.iter().zip(predicted).map(|(a, b)| a * b).sum();
-        // For a joint with mostly friction torque the prediction is not meaningful.
+        // If most of a joint's torque is friction, the prediction is not meaningful.
         if product.abs() < 0.5 * size * norm(&recorded) {
             continue;
         }

@@ -19,17 +19,17 @@ pub enum LogTableError {
     /// The first line of the log must name all columns. Correct it as the message states.
     #[error("column {column} is missing in line 1 (`{found}`): write {}, separated by commas", expected.join(","))]
     NoColumn {
-        /// The missing column.
+        /// Name of the missing column.
         column: String,
-        /// All required columns.
+        /// Names of all required columns.
         expected: Vec<String>,
-        /// The header.
+        /// The header line.
         found: String,
     },
     /// The line has fewer or more fields than the first line of the file. Write the row again, completely.
     #[error("line {line}: {found} fields where the header has {expected}")]
     Fields {
-        /// The line, from 1.
+        /// Line number, from 1.
         line: usize,
         /// Number of columns in the header.
         expected: usize,
@@ -39,7 +39,7 @@ pub enum LogTableError {
     /// The field is empty, text, NaN or infinite. Write a number.
     #[error("line {line}, column {column}: `{field}` is not a finite number")]
     NotANumber {
-        /// The line, from 1.
+        /// Line number, from 1.
         line: usize,
         /// The column.
         column: String,
@@ -49,9 +49,9 @@ pub enum LogTableError {
     /// Each row must have a later time than the one before. Write each sample once, in order of time.
     #[error("line {line}: time {time_s} s does not come after the line before")]
     Time {
-        /// The line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// Its time, s.
+        /// Time in that line, s.
         time_s: f64,
     },
     /// The program is still writing the log, so the run is not used yet. Write the file under another name and rename
@@ -63,8 +63,8 @@ pub enum LogTableError {
     },
 }
 
-/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` in any order, other columns ignored; seconds, rad (m), Nm
-/// (N).
+/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` in any order; other columns are ignored. Units:
+/// seconds, rad (m), Nm (N).
 ///
 /// # Errors
 /// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line is unfinished.
@@ -72,8 +72,8 @@ pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -
     read_log_with_currents(path, joints, rate_hz, None)
 }
 
-/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, instead
-/// of `tau1..`.
+/// Reads a log like [`read_log_table`]. With torque constants, Nm/A (N/A), the log can have currents `i1..`, A,
+/// instead of `tau1..`.
 pub(super) fn read_log_with_currents(
     path: &std::path::Path,
     joints: &[String],

@@ -1,5 +1,5 @@
-//! Interface of robots: a robot runs a trajectory with a controller and returns a record. Implementations: the built-in
-//! simulator, another process, a function, and a person with a folder.
+//! Interface of robots: a robot runs a trajectory with a controller and returns a record. Implementations: the
+//! built-in simulator, another process, a function, and a folder in which a person exchanges files.
 
 mod client;
 mod conversation;
@@ -56,7 +56,7 @@ use thiserror::Error;
 /// Purpose of a motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPurpose {
-    /// A run that is fitted.
+    /// A run that is used for the fit.
     #[default]
     Run,
     /// A warm-up pass along the motion of the next run.
@@ -66,16 +66,16 @@ pub enum RunPurpose {
         /// Number of passes.
         of: usize,
     },
-    /// A held-out motion, which validates the model of the run with this number.
+    /// A held-out motion, which validates the model of the run with the same number.
     HeldOut,
 }
 
 /// A request to a robot to run a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub struct RunRequest<'a> {
-    /// Number of the run, from 1; names its folder.
+    /// Number of the run, from 1; it determines the name of the run's folder.
     pub run: usize,
-    /// The trajectory; its rate is that of the controller.
+    /// The trajectory; its sampling rate is the rate of the controller.
     pub reference: &'a Reference,
     /// The controller.
     pub controller: &'a ControllerSettings,
@@ -87,18 +87,20 @@ pub struct RunRequest<'a> {
     pub oscillation: Option<OscillationLimits>,
     /// Signal that stops the run.
     pub stop: Option<&'a StopSignal>,
-    /// Receives every sample when it arrives, if the robot streams samples.
+    /// Receives every sample when it arrives, if the robot sends samples during the motion.
     pub observer: Option<&'a dyn SampleObserver>,
-    /// Speed of the reference as a share of the trajectory's speed; below 1 only in slow runs before the first run.
+    /// Speed of the reference as a share of the trajectory's speed; below 1 only in slow motions before the first
+    /// run.
     pub speed: f64,
     /// Purpose of the motion.
     pub purpose: RunPurpose,
-    /// Paths from home to the motion and back. Without them the robot has to be at the begin of the motion.
+    /// Paths from the home posture to the motion and back. Without them the robot has to be at the beginning of the
+    /// motion.
     pub ways: Option<&'a ApproachPaths>,
 }
 
 impl<'a> RunRequest<'a> {
-    /// Creates a request without model, envelope and stop signal: set the fields as needed.
+    /// Creates a request without model, envelope and stop signal; set the fields that are needed.
     pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
         Self {
             run,
@@ -115,7 +117,7 @@ impl<'a> RunRequest<'a> {
         }
     }
 
-    /// Name of the folder for its files; slow runs and warm-ups have their own folders.
+    /// Name of the folder for the files of the run; slow motions and warm-ups have separate folders.
     pub fn folder_name(&self) -> String {
         let run = format!("run_{}", self.run);
         match self.purpose {
@@ -140,7 +142,7 @@ impl<'a> RunRequest<'a> {
         self.stop.is_some_and(StopSignal::is_requested)
     }
 
-    /// Checks that reference, controller and model fit `joints` joints.
+    /// Checks that reference, controller and model have `joints` joints.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -161,15 +163,16 @@ impl<'a> RunRequest<'a> {
 /// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotRun {
-    /// How it ended.
+    /// How the run ended.
     pub status: RobotStatus,
-    /// The record of the motion, up to its end or the failure. Joints in the model's order, all values finite.
+    /// The record of the motion, up to its end or the failure. Joints are in the model's order; all values are
+    /// finite.
     pub record: Record,
     /// The true motion, if the robot is the simulator.
     pub truth: Option<Run>,
-    /// The records of the paths from and to home, if available.
+    /// The records of the paths from and to the home posture, if available.
     pub ways: Option<WayRecords>,
-    /// Change of the record's time stamps in words; `None` if they are unchanged.
+    /// Description of the change of the record's time stamps; `None` if they were not changed.
     pub note: Option<String>,
 }
 
@@ -179,8 +182,8 @@ impl RobotRun {
         Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None, note: None }
     }
 
-    /// Describes how the run ended, and why it was stopped according to its record: torque that did not respond, or an
-    /// oscillation of at least `lowest_hz` (Hz).
+    /// Describes how the run ended. If the record shows why it was stopped, adds the reason: torque that did not
+    /// respond, or an oscillation of at least `lowest_hz` (Hz).
     pub fn ending(&self, reference: &Reference, lowest_hz: f64) -> String {
         let of_joint = |(joint, time_s)| held_torque::held_torque(reference, &self.record, joint, time_s);
         let held = self.status.too_far().and_then(of_joint).map(|held| held.to_string());
@@ -204,7 +207,7 @@ impl RobotRun {
     }
 }
 
-/// How a robot's run ended.
+/// How a run of a robot ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "end", rename_all = "kebab-case")]
@@ -213,7 +216,7 @@ pub enum RobotStatus {
     Done,
     /// The simulated run stopped early: divergence or a limit.
     Simulated {
-        /// Verdict of the simulator.
+        /// Status of the simulation.
         verdict: RunStatus,
     },
     /// The robot stopped early and gave a reason.
@@ -226,9 +229,9 @@ pub enum RobotStatus {
         /// Whether the stop was confirmed.
         stopping: Stopping,
     },
-    /// A sample left the envelope, and the run was stopped.
+    /// A sample was outside the envelope, and the run was stopped.
     LeftEnvelope {
-        /// The breach.
+        /// The violation.
         breach: Breach,
         /// Whether the stop was confirmed.
         stopping: Stopping,
@@ -250,7 +253,7 @@ pub enum RobotStatus {
     },
     /// The log does not exist yet: a person has to run the trajectory and save it.
     Waiting {
-        /// The run's folder.
+        /// Folder of the run.
         folder: PathBuf,
         /// The missing input.
         reason: String,
@@ -275,7 +278,7 @@ impl RobotStatus {
         }
     }
 
-    /// The joint that was stopped because of its tracking error, and the time, s.
+    /// The joint whose tracking error caused the stop, and the time, s.
     fn too_far(&self) -> Option<(&str, f64)> {
         match self {
             Self::Simulated { verdict: RunStatus::LimitBroken { time_s, joint, quantity, .. } } => {
@@ -315,7 +318,7 @@ pub enum RobotFault {
     /// command.
     #[error("robot program {program}: cannot be started: {reason}")]
     NotStarted {
-        /// The program.
+        /// Name of the program.
         program: String,
         /// Error of the operating system.
         reason: String,
@@ -323,11 +326,11 @@ pub enum RobotFault {
     /// The program stopped with an error. The message contains its last text on standard error.
     #[error("the robot program ended before it sent its {waiting_for} ({exit}){said}")]
     Died {
-        /// The expected message.
+        /// The message that was expected.
         waiting_for: String,
-        /// Its exit status.
+        /// Exit status of the program.
         exit: String,
-        /// The end of its standard error, or an empty string.
+        /// The end of the program's standard error, or an empty string.
         said: String,
     },
     /// The program waits for something, or is slower than the limit. Run it by hand to see what it waits for.
@@ -335,7 +338,7 @@ pub enum RobotFault {
         "the robot program sent no {waiting_for} within {limit_s} s: check the program, or raise this limit in limits of [iteration.robot]"
     )]
     Hung {
-        /// The expected message.
+        /// The message that was expected.
         waiting_for: String,
         /// The time limit, s.
         limit_s: f64,
@@ -363,13 +366,13 @@ pub enum RobotFault {
     OutOfTurn {
         /// Type of the message.
         found: String,
-        /// Expected type.
+        /// Expected type of the message.
         expected: String,
     },
     /// The program sent a sample with a missing, NaN or infinite value. Correct the program.
     #[error("sample {sample} of the robot: {what} is not a finite number")]
     NotANumber {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
         /// The value.
         what: String,
@@ -377,9 +380,9 @@ pub enum RobotFault {
     /// The program sent a sample with the wrong number of joints. Send one entry for each joint of its `hello`.
     #[error("sample {sample} of the robot: {what} has {found} entries for {expected} joints")]
     WrongJoints {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
-        /// The vector.
+        /// Name of the vector.
         what: String,
         /// Number of joints.
         expected: usize,
@@ -399,28 +402,28 @@ pub enum RobotFault {
     /// clock.
     #[error("sample {sample} of the robot: time {time_s} s comes after {before_s} s")]
     Time {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
-        /// Its time, s.
+        /// Time of the sample, s.
         time_s: f64,
-        /// The previous time, s.
+        /// Time of the previous sample, s.
         before_s: f64,
     },
     /// The program sends samples faster than the stated rate, or did not stop after the motion. Correct the program.
     #[error("the robot sent more than {most} samples for a run of {duration_s} s")]
     TooMuch {
-        /// Largest number of samples.
+        /// Maximum number of samples.
         most: usize,
-        /// Length of the run, s.
+        /// Duration of the run, s.
         duration_s: f64,
     },
     /// The program was written for another version of the protocol, or lacks the `mode` of `[iteration.robot]`. Adapt
     /// the program, or change `mode`.
     #[error("the robot program supports {found}, not {expected}")]
     Protocol {
-        /// Supported by the program.
+        /// What the program supports.
         found: String,
-        /// Required.
+        /// What is required.
         expected: String,
     },
     /// The `hello` of the program states that it logs a torque without gravity or friction, or currents with invalid
@@ -435,11 +438,11 @@ pub enum RobotFault {
     /// The program reported success, but did not send all samples. Send the samples until the end of the motion.
     #[error("the robot reported done, but its record of the {} ends at {end_s} s of {duration_s} s", .part.name())]
     Short {
-        /// Last time of the record, s.
+        /// Last time in the record, s.
         end_s: f64,
-        /// Length of the trajectory, s.
+        /// Duration of the trajectory, s.
         duration_s: f64,
-        /// The part of the run.
+        /// The part of the run that is incomplete.
         #[serde(default, skip_serializing_if = "RunPart::is_motion")]
         part: RunPart,
     },
@@ -453,7 +456,7 @@ pub enum RobotFault {
     /// Check the samples of the robot.
     #[error("the controller's torque at sample {sample} is not a finite number")]
     Torque {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
     },
     /// The times that the program sends are probably in ms or µs.
@@ -461,17 +464,17 @@ pub enum RobotFault {
         "sample {sample} of the robot: its time is {step_s} s after the previous one, but the period is {period_s} s: give the time in seconds"
     )]
     Clock {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
-        /// The step, s.
+        /// Step between two samples, s.
         step_s: f64,
-        /// The period, s.
+        /// Sampling period, s.
         period_s: f64,
     },
     /// The function that a program passed as robot raised an error. The text after the sample has its message.
     #[error("the function of the robot failed at sample {sample}: {reason}")]
     Function {
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
         /// The reason.
         reason: String,
@@ -489,15 +492,15 @@ pub enum RobotFault {
 
 /// A robot: the interface between an experiment and the robot, real or simulated.
 pub trait Robot: core::fmt::Debug {
-    /// Its name, for messages.
+    /// Name of the robot, for messages.
     fn name(&self) -> &str;
 
-    /// Names of its joints, in the model's order.
+    /// Names of the joints, in the model's order.
     fn joints(&self) -> &[String];
 
-    /// Whether a person has corrected the log of a run since it was read. `folder_name` is that of its request
-    /// ([`RunRequest::folder_name`]), `kept` the stored record along `reference`. Only a robot with logs from a person
-    /// may return true; the corrected log is then evaluated again.
+    /// Whether a person has corrected the log of a run since it was read. `folder_name` is the folder name of the
+    /// run's request ([`RunRequest::folder_name`]), `kept` the stored record along `reference`. Only a robot whose
+    /// logs come from a person can return true; the corrected log is then evaluated again.
     fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
         false
     }

@@ -7,10 +7,10 @@ use dynident_simulation::{Record, Reference};
 
 /// Number of samples from which the rate of a log is computed.
 const RATE_SAMPLES: usize = 32;
-/// Reference speed of a joint that does not move in a trajectory, as a share of the fastest joint's speed.
+/// Substitute for the speed of a joint that does not move in a trajectory, as a share of the fastest joint's speed.
 const REST_SPEED_SHARE: f64 = 0.1;
 
-/// Highest speed of each joint in a trajectory, rad/s (m/s), with a substitute for joints at rest.
+/// Highest speed of each joint in a trajectory, rad/s (m/s), with a substitute for joints that do not move.
 fn reference_speeds(reference: &Reference) -> Vec<f64> {
     let highest = highest_speeds([reference]);
     let fastest = highest.iter().copied().fold(0.0, f64::max);
@@ -22,7 +22,7 @@ pub(crate) struct RunOscillations {
     limits: Option<OscillationLimits>,
     /// Time of the first sample, s, and the number of samples.
     begin: (f64, usize),
-    /// The newest sample: its time, s, and the tracking error of each joint, rad (m).
+    /// The newest sample: time, s, and tracking error of each joint, rad (m).
     newest: (f64, Vec<f64>),
     joints: Vec<Option<OscillationWatch>>,
 }
@@ -32,8 +32,8 @@ impl RunOscillations {
         Self { limits, begin: (0.0, 0), newest: (0.0, Vec::new()), joints: Vec::new() }
     }
 
-    /// Adds a sample along a trajectory: its time, s, and positions, rad (m). Returns the index of an oscillating
-    /// joint, with frequency and amplitude.
+    /// Adds a sample along a trajectory: time, s, and positions, rad (m). Returns the index of an oscillating joint,
+    /// with frequency and amplitude.
     pub(crate) fn look(&mut self, reference: &Reference, time_s: f64, q: &[f64]) -> Option<(usize, JointOscillation)> {
         let limits = self.limits?;
         let distance = |(joint, q): (usize, &f64)| q - target_at(reference, joint, time_s);
@@ -84,7 +84,7 @@ impl RunOscillations {
     }
 }
 
-/// The joint with the largest oscillation, relative to its speed in the trajectory, when a run was stopped; the record
+/// When a run was stopped: the joint with the largest oscillation relative to its speed in the trajectory. The record
 /// is joint-major.
 pub(super) fn oscillation_at_end(reference: &Reference, record: &Record, lowest_hz: f64) -> Option<JointOscillation> {
     let times_s = &record.times_s[..record.samples];

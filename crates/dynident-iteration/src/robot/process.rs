@@ -8,9 +8,9 @@ use dynident_system::{PermittedProgram, TemporaryFolder};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A robot behind a program's standard input and output. The program is started with the first run and reused; after a
-/// failure it is killed, and the next run starts it again. On Unix it has its own process group, which ends with this
-/// robot.
+/// A robot behind a program's standard input and output. The program is started with the first run and reused. After
+/// a failure it is killed, and the next run starts it again. On Unix the program has a separate process group, which
+/// is ended together with this robot.
 #[derive(Debug)]
 pub struct ProcessRobot {
     settings: ProcessSettings,
@@ -101,7 +101,7 @@ impl Robot for ProcessRobot {
             }
             Err(fault) => {
                 let stopping = self.client.as_mut().and_then(|client| client.stop_after(&fault));
-                // Its state is unknown, so the next run starts a new program.
+                // The state of the program is unknown, so the next run starts it again.
                 self.client = None;
                 RobotStatus::Failed { fault, stopping }
             }

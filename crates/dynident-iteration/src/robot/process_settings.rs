@@ -3,41 +3,41 @@ use dynident_system::{PermittedProgram, ProgramPermission, ProgramPurpose, Progr
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Which side runs the control loop.
+/// Where the control loop runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessMode {
-    /// The client, at its own rate, from the input files.
+    /// The robot program runs the control loop, at its own rate, from the input files.
     #[default]
     Run,
-    /// The host: it sends a torque and receives a state for each sample.
+    /// Dynident runs the control loop: it sends a torque and receives a state for each sample.
     Step,
 }
 
-/// Time limits of the client.
+/// Time limits of the robot program.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessLimits {
-    /// Longest time from the start of the program to its `hello`, s; then the program is killed. Default 30.
+    /// Longest time from the start of the program to its `hello` message, s; later the program is killed. Default 30.
     pub hello_s: f64,
-    /// Longest time from one message of the program to the next, s; then the program is killed. In mode `run` the
-    /// remaining time of the motion is added, because a program may send its samples afterwards; moving to the start
-    /// and back is limited to this time, too. Default 60.
+    /// Longest time from one message of the program to the next, s; later the program is killed. In mode `run` the
+    /// remaining time of the motion is added, because a program may send its samples after the motion. Moving to the
+    /// start and back is limited to this time, too. Default 60.
     pub message_s: f64,
     /// Longest time from one sample to the next in mode `run` while samples arrive in real time, s; a program that is
-    /// silent for longer during a motion is stopped. Default ten sample periods, at least 0.2 s. Not used for programs
-    /// that send samples afterwards, in batches, or faster or slower than real time.
+    /// silent for longer during a motion is stopped. Default ten sampling periods, at least 0.2 s. Not used for
+    /// programs that send samples after the motion, in batches, or faster or slower than real time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub silence_s: Option<f64>,
-    /// Longest duration of a run, s; then the program is killed. Default none.
+    /// Longest duration of a run, s; later the program is killed. Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_s: Option<f64>,
-    /// Longest time from a stop message to the program's `end`, s; then the program is killed. Default 5.
+    /// Longest time from a stop message to the program's `end` message, s; later the program is killed. Default 5.
     pub stop_s: f64,
-    /// Longest time from Dynident's `bye` to the end of the program, s; then the program is terminated, and killed
-    /// after the same time again. Default 2.
+    /// Longest time from Dynident's `bye` message to the end of the program, s; later the program is terminated, and
+    /// killed after the same time again. Default 2.
     pub bye_s: f64,
 }
 
@@ -54,14 +54,14 @@ impl Default for ProcessLimits {
 pub struct ProcessSettings {
     /// Program and arguments.
     pub command: Vec<String>,
-    /// Which side runs the control loop; by default the program.
+    /// Where the control loop runs; by default in the program.
     #[serde(default)]
     pub mode: ProcessMode,
     /// Time limits of the program.
     #[serde(default)]
     pub limits: ProcessLimits,
     /// Folder for the input files `run_k/trajectory.csv` and `run_k/controller.json`. Default a temporary folder,
-    /// deleted with the robot.
+    /// which is deleted at the end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub folder: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! Messages between an experiment (host) and a robot program (client): one JSON object per line. See the page
+//! Messages between Dynident (host) and a robot program (client): one JSON object per line. See the page
 //! `robot-protocol.md` of the book.
 
 use super::envelope::Envelope;
@@ -18,7 +18,7 @@ pub enum ToClient {
         run: usize,
         /// Rate of the controller, Hz.
         rate_hz: f64,
-        /// The trajectory's length, s.
+        /// Duration of the trajectory, s.
         duration_s: f64,
         /// Path of the trajectory: `t_s, q.., dq.., ddq..` and the model's torques `tau..`, if there is a model.
         trajectory: String,
@@ -28,55 +28,56 @@ pub enum ToClient {
         /// them.
         #[serde(skip_serializing_if = "Option::is_none")]
         envelope: Option<Envelope>,
-        /// Paths from home to the trajectory and back, each a table like the trajectory; one controller runs all three
-        /// without a pause. Only for clients with the capability `home`.
+        /// Paths from the home posture to the trajectory and back, each a table like the trajectory. One controller
+        /// runs all three without a pause. Only for clients with the capability `home`.
         #[serde(skip_serializing_if = "Option::is_none")]
         home: Option<WayFiles>,
     },
-    /// Begin of a run in mode `step`: move to the start and send the state. The paths from and to home are part of the
-    /// run.
+    /// Begin of a run in mode `step`: move to the start and send the state. The paths from and to the home posture
+    /// are part of the run.
     Begin {
         /// Number of the run.
         run: usize,
-        /// Samples per second.
+        /// Sampling rate, Hz.
         rate_hz: f64,
         /// Number of torques that follow.
         samples: usize,
-        /// Positions to start from, rad (m).
+        /// Start positions, rad (m).
         q: Vec<f64>,
-        /// Velocities to start with.
+        /// Start velocities, rad/s (m/s).
         dq: Vec<f64>,
-        /// As in a run.
+        /// Limits of every sample, as in [`ToClient::Run`].
         #[serde(skip_serializing_if = "Option::is_none")]
         envelope: Option<Envelope>,
     },
     /// Apply this torque for one sample, then send the state.
     Torque {
-        /// Nm (N).
+        /// Torques of the drives, Nm (N).
         tau: Vec<f64>,
     },
-    /// The steps are over: stop, and send an end.
+    /// The run is complete: stop, and send an end.
     Finish {},
-    /// Stop the robot at once and send an end. May arrive at any time of a run, also instead of a torque.
+    /// Stop the robot immediately and send an end. This message can arrive at any time of a run, also instead of a
+    /// torque.
     Stop {
         /// Why.
         reason: String,
     },
-    /// Last message.
+    /// Last message: the program must end.
     Bye {},
 }
 
-/// Files of the paths from and to home.
+/// Files of the paths from and to the home posture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WayFiles {
     /// Path of the file of the approach to the trajectory's first posture.
     pub approach: String,
-    /// Its length, s; 0 if the robot is there already.
+    /// Duration of the approach, s; 0 if the robot is already there.
     pub approach_s: f64,
     /// Path of the file of the return from the last posture.
     #[serde(rename = "return")]
     pub back: String,
-    /// Its length, s.
+    /// Duration of the return, s.
     pub return_s: f64,
 }
 
@@ -85,20 +86,21 @@ pub struct WayFiles {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ToHost {
-    /// First message.
+    /// First message of the client.
     Hello {
-        /// [`PROTOCOL`].
+        /// Name and version of the protocol, [`PROTOCOL`].
         protocol: String,
         /// Name of the robot.
         name: String,
-        /// Names of its joints, in the order of all its vectors.
+        /// Names of the joints, in the order of all vectors.
         joints: Vec<String>,
         /// Supported modes: `run`, `step`.
         modes: Vec<String>,
         /// Quantity that is logged as torque; default the complete drive torque, Nm (N).
         #[serde(default)]
         logs: LoggedTorque,
-        /// Capabilities beyond the first version of the protocol: `home` (paths of a run). Others are ignored.
+        /// Capabilities beyond the first version of the protocol: `home` (the client runs approach and return paths).
+        /// Unknown ones are ignored.
         #[serde(default)]
         capabilities: Vec<String>,
     },
@@ -107,7 +109,7 @@ pub enum ToHost {
         /// The part of the run; default the motion.
         #[serde(default)]
         part: RunPart,
-        /// Time since the begin of that part, s.
+        /// Time since the beginning of this part, s.
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,
@@ -117,9 +119,9 @@ pub enum ToHost {
         /// Torques of the drives, Nm (N).
         tau: Vec<Option<f64>>,
     },
-    /// The state in mode `step`.
+    /// The state of the robot in mode `step`.
     State {
-        /// Time since the run's begin, s.
+        /// Time since the beginning of the run, s.
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,
@@ -130,7 +132,7 @@ pub enum ToHost {
     End {
         /// `done` or `stopped`.
         status: EndStatus,
-        /// Why it stopped.
+        /// Reason for the stop.
         #[serde(default)]
         reason: String,
     },
@@ -166,7 +168,7 @@ pub enum EndStatus {
 }
 
 impl ToHost {
-    /// The message's type.
+    /// Type of the message.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Hello { .. } => "hello",

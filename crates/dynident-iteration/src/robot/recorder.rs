@@ -23,7 +23,8 @@ pub(super) fn joint_major(mut record: Record) -> Record {
 struct Part<'a> {
     which: RunPart,
     reference: &'a Reference,
-    /// Number of its samples by the controller's count; samples that it shares with the motion belong to the motion.
+    /// Number of samples of the part by the controller's count. Samples at the border between a path and the motion
+    /// belong to the motion.
     samples: usize,
     record: Record,
     watch: EnvelopeWatch<'a>,
@@ -34,7 +35,7 @@ struct Part<'a> {
 pub(super) struct Recorder<'a> {
     parts: Vec<Part<'a>>,
     at: usize,
-    /// Time of the sample at which the current part begins, by the robot's clock, s.
+    /// Time at which the current part begins, by the robot's clock, s.
     zero_s: f64,
     joints: Vec<String>,
     observer: Option<&'a dyn SampleObserver>,
@@ -76,7 +77,7 @@ impl<'a> Recorder<'a> {
         self.require_end().is_ok()
     }
 
-    /// Begins a part; later samples belong to it.
+    /// Begins a part of the run; later samples belong to it.
     ///
     /// # Errors
     /// A part that this run does not have, or an earlier one; an incomplete current part.
@@ -107,7 +108,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Two samples of the slower of the two clocks may be missing, or a hundredth of the part.
+    /// At the end of a part, two samples of the slower of the two clocks may be missing, or a hundredth of the part.
     fn require_end(&self) -> Result<(), RobotFault> {
         let Part { which, reference, record, .. } = &self.parts[self.at];
         let (end_s, duration_s) = (record.times_s.last().copied().unwrap_or(0.0), reference.duration_s());
@@ -118,22 +119,22 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Time within its part of the controller's next sample at `time_s` of the robot's clock; begins the part. In this
-    /// mode the robot runs approach, motion and return as one motion.
+    /// Time, within its part, of the controller's next sample at `time_s` of the robot's clock; begins a new part if
+    /// necessary. In this mode the robot runs approach, motion and return as one motion.
     pub(super) fn time_of_next(&mut self, time_s: f64) -> f64 {
         while self.parts[self.at].record.samples >= self.parts[self.at].samples && self.at + 1 < self.parts.len() {
-            // The return begins at the last sample of the motion, which it shares.
+            // The return begins at the last sample of the motion, which both parts share.
             let last_s = self.parts[self.at].record.times_s.last().copied();
             let shared_s = last_s.filter(|_| self.parts[self.at].which == RunPart::Motion);
             self.zero_s = shared_s.map_or(time_s, |shared_s| self.zero_s + shared_s);
             self.at += 1;
         }
-        // Do not even subtract a zero in the first part.
+        // In the first part not even zero is subtracted, so that times are bit-identical.
         if self.at == 0 { time_s } else { time_s - self.zero_s }
     }
 
-    /// Passes the newest sample to the observer, and returns the breach of the envelope there, if any; `dq` are the
-    /// measured velocities, if available.
+    /// Passes the newest sample to the observer, and returns the violation of the envelope by this sample, if any;
+    /// `dq` are the measured velocities, if available.
     pub(super) fn look(&mut self, dq: Option<&[f64]>) -> Option<Breach> {
         let Part { which, record, watch, .. } = &mut self.parts[self.at];
         if let (Some(observer), Some(last)) = (self.observer, record.samples.checked_sub(1)) {

@@ -4,15 +4,16 @@ use dynident_excitation::limits::{BoxLimit, JointLimit, Limits, LinkPoint};
 use dynident_model::Model;
 use dynident_simulation::SimulationError;
 
-/// Distance of the unbounded end of a range that the envelope bounds on one side only, rad (m for an arm of 1.2 m):
-/// unreachable.
+/// Distance of the unbounded end of a range that the envelope limits on one side only, rad (m for an arm of 1.2 m):
+/// no joint reaches it.
 const UNREACHABLE_DISTANCE: f64 = 40.0;
 
 impl EnvelopeSettings {
     /// Narrows `limits` so that a motion within them stays in this envelope, with a `margin` (0 to below 1) for the
-    /// tracking error: positions by this share of the allowed tracking error, at most of half the range; watched points
-    /// by this share of that error times the lever arm, at most of half the box; stated velocity and torque by this
-    /// share of themselves. Torque is limited only if the robot description has the inertials of all bodies.
+    /// tracking error. Positions are narrowed by this share of the allowed tracking error, at most by half the range.
+    /// Watched points are narrowed by this share of that error times the lever arm, at most by half the box. Velocity
+    /// and torque limits given in the study are reduced by this share. Torque is limited only if the robot
+    /// description has the inertials of all bodies.
     ///
     /// # Errors
     /// As [`envelope`](Self::envelope).
@@ -21,7 +22,7 @@ impl EnvelopeSettings {
         let errors: Vec<f64> = envelope.tracking_error.iter().map(|error| margin * error.unwrap_or(0.0)).collect();
         let own = model.characteristic_scale();
         let known = model.bodies_without_prior().is_empty();
-        // Defaults from the robot description already have a margin: `LIMIT_FACTOR` of the envelope.
+        // Defaults from the robot description already have a margin, the `LIMIT_FACTOR` of the envelope.
         let kept = |stated: bool| if stated { 1.0 - margin } else { 1.0 };
         for (place, joint) in model.joints().iter().enumerate() {
             let at = limits.joints.iter().position(|limit| limit.joint == joint.name).unwrap_or_else(|| {
@@ -58,8 +59,8 @@ impl EnvelopeSettings {
 }
 
 impl WorkspaceBox {
-    /// The box with the watched points, each kept inside by the effect of the tracking errors; `None` if no axis is
-    /// bounded.
+    /// The box with the watched points, narrowed for each point by the effect of the tracking errors; `None` if no
+    /// axis is bounded.
     fn limit(&self, model: &Model, errors: &[f64], margin: f64) -> Option<BoxLimit> {
         let far = model.characteristic_scale().metres(UNREACHABLE_DISTANCE);
         let bounds = (0..3).map(|axis| match (self.lower[axis], self.upper[axis]) {
@@ -89,8 +90,8 @@ impl WatchedPoint {
         Some(LinkPoint { link: link.name.clone(), at_m: at.0, radius_m: 0.0 })
     }
 
-    /// Displacement of the point by the errors of the joints before it, rad (m): root of the sum of squares of each
-    /// error times the lever arm from its joint to the point.
+    /// Displacement of the point by the tracking errors of the joints that move it, m: root of the sum of squares of
+    /// each error times the lever arm from its joint to the point.
     fn reach_of_errors(&self, model: &Model, errors: &[f64]) -> f64 {
         let mut length_m = dynident_model::Vec3(self.offset_m).norm();
         let (mut square, mut body) = (0.0, Some(self.body));

@@ -4,8 +4,8 @@ use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
 
-/// A [`Plant`] with its sensors and limits as a [`Robot`]. The seed of the noise combines that of the settings and the
-/// run's number: different runs differ, and a repeated run is identical.
+/// A [`Plant`] with its sensors and limits as a [`Robot`]. The seed of the noise combines the seed of the settings
+/// and the number of the run: different runs have different noise, and a repeated run is identical.
 #[derive(Debug)]
 pub struct SimulatedRobot {
     plant: Plant,
@@ -24,7 +24,7 @@ impl SimulatedRobot {
         Ok(Self { plant, settings, joints })
     }
 
-    /// Locks the named joints where a run begins, as [`Plant::with_locked`].
+    /// Locks the named joints at the position where a run begins, like [`Plant::with_locked`].
     ///
     /// # Errors
     /// A joint that does not exist.

@@ -5,17 +5,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Breach {
-    /// The joint, or the link of which a point left the workspace.
+    /// The joint, or the link of which a point is outside the workspace.
     pub joint: String,
-    /// The limited quantity.
+    /// Limited quantity.
     pub quantity: EnvelopeQuantity,
-    /// Its value, in rad, rad/s, Nm (m, m/s, N).
+    /// Value of the quantity, in rad, rad/s, Nm (m, m/s, N).
     pub value: f64,
     /// The limit.
     pub limit: f64,
-    /// Time since the begin of the part, s.
+    /// Time since the beginning of the part, s.
     pub time_s: f64,
-    /// The part of the run; always the motion without approach and return paths.
+    /// The part of the run; always the motion if there are no approach and return paths.
     #[serde(default, skip_serializing_if = "RunPart::is_motion")]
     pub part: RunPart,
 }
@@ -49,13 +49,13 @@ impl SampleBreach {
 pub struct JointOscillation {
     /// The joint.
     pub joint: String,
-    /// Its frequency, Hz.
+    /// Frequency of the oscillation, Hz.
     pub frequency_hz: f64,
-    /// Amplitude of the velocity about that of the trajectory, rad/s (m/s).
+    /// Amplitude of the velocity relative to the velocity of the trajectory, rad/s (m/s).
     pub amplitude: f64,
-    /// Time of the detection since the begin of the part, s.
+    /// Time of the detection since the beginning of the part, s.
     pub time_s: f64,
-    /// The part of the run; always the motion without approach and return paths.
+    /// The part of the run; always the motion if there are no approach and return paths.
     #[serde(default, skip_serializing_if = "RunPart::is_motion")]
     pub part: RunPart,
 }
@@ -86,16 +86,16 @@ pub enum EnvelopeQuantity {
     Torque,
     /// Tracking error, rad (m).
     TrackingError,
-    /// The x of a point in the base frame, m.
+    /// Coordinate x of a point in the base frame, m.
     X,
-    /// Its y, m.
+    /// Coordinate y of a point in the base frame, m.
     Y,
-    /// Its z (height), m.
+    /// Coordinate z (height) of a point in the base frame, m.
     Z,
 }
 
 impl EnvelopeQuantity {
-    /// Its name in messages.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Position => "position",

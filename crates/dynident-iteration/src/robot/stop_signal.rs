@@ -2,8 +2,8 @@ use core::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Requests robots to stop. It is shared between the source of requests (a Ctrl-C handler, a button) and the code that
-/// runs a robot. After a request, the current run gets a stop message, and no further run begins;
+/// Requests robots to stop. It is shared between the source of requests (a Ctrl-C handler, a button) and the code
+/// that runs a robot. After a request, the current run receives a stop message, and no further run begins.
 /// [`kill_robots`](Self::kill_robots) does not wait for the answer.
 ///
 /// ```
@@ -37,7 +37,7 @@ impl fmt::Debug for StopSignal {
 }
 
 impl StopSignal {
-    /// Requests the stop; running robots are notified at once.
+    /// Requests the stop; running robots are notified immediately.
     pub fn request(&self) {
         self.shared.requested.store(true, Ordering::SeqCst);
         self.each(|listener| (listener.wake)());
@@ -48,14 +48,14 @@ impl StopSignal {
         self.shared.requested.load(Ordering::SeqCst)
     }
 
-    /// Kills every robot program with its process group, without a stop message; returns whether there was one. The
-    /// robots may still be moving afterwards.
+    /// Kills every robot program with its process group, without a stop message; returns whether there was a program.
+    /// The robots may still be moving afterwards.
     pub fn kill_robots(&self) -> bool {
         self.each(|listener| (listener.kill)()) > 0
     }
 
-    /// Registers callbacks: `wake` is called on a stop request, `kill` by [`kill_robots`](Self::kill_robots), until the
-    /// guard is dropped. Both must not block.
+    /// Registers callbacks until the guard is dropped: `wake` is called on a stop request, `kill` by
+    /// [`kill_robots`](Self::kill_robots). Both must return immediately.
     pub(super) fn listen(&self, wake: Box<dyn Fn() + Send>, kill: Box<dyn Fn() + Send>) -> Listening {
         let number = self.shared.next.fetch_add(1, Ordering::SeqCst);
         if let Ok(mut listeners) = self.shared.listeners.lock() {

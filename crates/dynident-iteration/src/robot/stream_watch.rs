@@ -1,20 +1,20 @@
-//! Detects whether a program streams its samples in real time, and limits its silence.
+//! Detects whether a program sends its samples in real time, and limits the time without samples.
 
 use std::time::Instant;
 
-/// Longest silence of a streaming program, in sample periods.
+/// Longest time without samples of a program that sends in real time, in sampling periods.
 const MAX_SILENCE_PERIODS: f64 = 10.0;
-/// Smallest limit of silence, s; schedulers and networks pause for some hundredths of a second.
+/// Minimum of this time limit, s; schedulers and networks can pause for some hundredths of a second.
 const MIN_SILENCE_S: f64 = 0.2;
-/// Largest difference of the motion's time and the clock at which a stream is in real time, s, plus this share of the
-/// elapsed time: buffers and networks delay samples, and clocks differ.
+/// Samples arrive in real time if the time in the motion differs from the clock by at most this time, s, plus this
+/// share of the elapsed time. Buffers and networks delay samples, and clocks differ.
 const MAX_LAG_S: f64 = 0.1;
 const MAX_DRIFT_SHARE: f64 = 0.02;
-/// A program is known to stream after it was in real time for this multiple of the usual silence. A simulator on a busy
-/// machine may do so for some tenths of a second by chance.
+/// A program is known to send in real time after it did so for this multiple of the usual time limit. A simulator on
+/// a busy machine can do so for some tenths of a second by chance.
 const MIN_STREAMING_RATIO: f64 = 5.0;
-/// Largest variation of the smallest delays of consecutive windows (each half the usual silence), s, plus this share of
-/// the time for clock drift. At least one sample of each window is not delayed by the scheduler.
+/// Largest variation of the smallest delays of consecutive time windows (each half of the usual time limit), s, plus
+/// this share of the time for clock drift. The scheduler does not delay at least one sample of each window.
 const MAX_DELAY_VARIATION_S: f64 = 0.005;
 const MAX_CLOCK_DRIFT_SHARE: f64 = 0.005;
 
@@ -24,8 +24,8 @@ struct Arrival {
     motion_s: f64,
 }
 
-/// Follows the arrival of samples. A program that sends its samples after the motion, or simulates faster or slower
-/// than real time, never streams.
+/// Monitors the arrival of samples. Programs that send their samples after the motion, or that simulate faster or
+/// slower than real time, are never treated as sending in real time.
 #[derive(Debug)]
 pub(super) struct StreamWatch {
     silence_s: Option<f64>,
@@ -41,15 +41,15 @@ struct Stream {
     is_known: bool,
 }
 
-/// Delay of the samples relative to the motion's time, window by window.
+/// Delay of the samples relative to the time in the motion, window by window.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// Begin of the real-time interval, in motion time, s.
+    /// Begin of the interval with samples in real time, as time in the motion, s.
     since_s: f64,
     window_s: f64,
     /// Smallest delay in the current window, s.
     delay_s: f64,
-    /// Smallest and largest of the window minima, s.
+    /// Smallest and largest of the windows' smallest delays, s.
     extremes: Option<(f64, f64)>,
 }
 
@@ -74,7 +74,7 @@ impl StreamWatch {
         stream.is_known |= motion_s - stream.pace.since_s >= MIN_STREAMING_RATIO * usual_s;
     }
 
-    /// The longest allowed silence, s; `None` if the program does not stream in real time.
+    /// Longest allowed time without samples, s; `None` if the program does not send in real time.
     pub(super) fn limit_s(&self) -> Option<f64> {
         let stream = self.stream.filter(|stream| stream.is_known)?;
         let elapsed_s = stream.last.at.duration_since(stream.first.at).as_secs_f64();
@@ -85,25 +85,25 @@ impl StreamWatch {
         self.silence_s.unwrap_or_else(|| self.usual_s())
     }
 
-    /// Default of the limit, s; it also sets the time after which a stream is known.
+    /// Default of the time limit, s. It also determines the time after which a program is known to send in real time.
     fn usual_s(&self) -> f64 {
         let period_s = self.stream.map_or(0.0, |Stream { first, last, samples, .. }| {
             (last.motion_s - first.motion_s).max(0.0) / samples.saturating_sub(1).max(1) as f64
         });
-        // At most a day: periods come from external input.
+        // At most a day, because sampling periods come from external input.
         (MAX_SILENCE_PERIODS * period_s).clamp(MIN_SILENCE_S, 86400.0)
     }
 }
 
 impl Stream {
-    /// Delay of the last sample relative to the motion's time, both since the first sample, s.
+    /// Delay of the last sample relative to the time in the motion, both measured since the first sample, s.
     fn behind_s(&self) -> f64 {
         self.last.at.duration_since(self.first.at).as_secs_f64() - (self.last.motion_s - self.first.motion_s)
     }
 }
 
 impl Pace {
-    /// Adds a sample that arrived with a delay of `delay_s` at the motion time `motion_s`.
+    /// Adds a sample that arrived with a delay of `delay_s` at the time `motion_s` of the motion.
     fn follow(&mut self, delay_s: f64, motion_s: f64, usual_s: f64) {
         self.delay_s = self.delay_s.min(delay_s);
         if motion_s - self.window_s < 0.5 * usual_s {

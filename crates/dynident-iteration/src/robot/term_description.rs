@@ -2,7 +2,7 @@ use dynident_model::Model;
 use dynident_model::terms::{CoulombShape, TermConstant, TorqueTerm};
 use serde_json::{Value, json};
 
-/// The term with its joints by name, its constants and its parameter.
+/// The term with the names of its joints, its constants and its parameter.
 pub(super) fn describe(model: &Model, term: &TorqueTerm, value: f64) -> Value {
     let name = |joint: usize| &model.joints()[joint].name;
     let mut out = json!({ "kind": term.kind_name() });

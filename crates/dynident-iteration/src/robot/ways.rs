@@ -10,12 +10,12 @@ const JOIN_TOLERANCE: f64 = 1e-9;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum RunPart {
-    /// From home to the motion's first posture.
+    /// Path from the home posture to the first posture of the motion.
     Approach,
     /// The motion.
     #[default]
     Motion,
-    /// From the motion's last posture to home.
+    /// Path from the last posture of the motion to the home posture.
     Return,
 }
 
@@ -28,7 +28,7 @@ impl RunPart {
         *self == Self::Motion
     }
 
-    /// Its name in messages.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
@@ -38,17 +38,18 @@ impl RunPart {
     }
 }
 
-/// The paths of one run, each from rest to rest.
+/// The approach and return paths of one run, each from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApproachPaths {
-    /// From home to the first posture of the motion.
+    /// Path from the home posture to the first posture of the motion.
     pub approach: Reference,
-    /// From the last posture of the motion to home.
+    /// Path from the last posture of the motion to the home posture.
     pub back: Reference,
 }
 
 impl ApproachPaths {
-    /// Checks that they fit a motion: same joints and rate, and no steps between the parts.
+    /// Checks that the paths are compatible with a motion: same joints and sampling rate, and no discontinuity
+    /// between the parts.
     ///
     /// # Errors
     /// Paths of another motion.
@@ -81,7 +82,7 @@ impl ApproachPaths {
         Ok(())
     }
 
-    /// Returns the paths at a share of their speed.
+    /// Returns the paths, executed at a share of their speed.
     ///
     /// # Errors
     /// As [`Reference::slowed`].
@@ -100,7 +101,7 @@ impl ApproachPaths {
         let mut whole = Motion::default();
         whole.reset(motion.joints(), samples);
         whole.dddq.clear();
-        // The shared samples are those of the motion.
+        // The samples that two parts share are taken from the motion.
         for (from, to, of) in [
             (0..before, 0, &self.approach),
             (0..motion.samples(), before, motion),
@@ -119,12 +120,13 @@ impl ApproachPaths {
     }
 }
 
-/// Records of the paths of a run, with times since the begin of each; they are stored but not used for identification.
+/// Records of the paths of a run, with times since the beginning of each path; they are stored but not used for
+/// identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WayRecords {
-    /// From home to the motion.
+    /// Record of the path from the home posture to the motion.
     pub approach: Record,
-    /// From the motion to home.
+    /// Record of the path from the motion to the home posture.
     pub back: Record,
 }
 
@@ -141,7 +143,7 @@ pub(super) fn cut(record: &Record, window_s: [f64; 2], zero_s: f64) -> Record {
         joints: record.joints.clone(),
         rate_hz: record.rate_hz,
         samples: kept.len(),
-        // Rounding may make the first time negative.
+        // Rounding can make the first time negative.
         times_s: kept.iter().map(|&sample| (record.times_s[sample] - zero_s).max(0.0)).collect(),
         q: some(&record.q),
         tau: some(&record.tau),

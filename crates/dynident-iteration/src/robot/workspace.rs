@@ -5,11 +5,12 @@ use dynident_simulation::{Reference, SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Largest distance from the axis of a joint on the base at which a point does not move with it, m.
+/// Largest distance from the axis of a joint on the base at which a point is treated as on the axis, so that the
+/// joint does not move it, m.
 const MAX_AXIS_DISTANCE_M: f64 = 1e-9;
 
 /// Settings `workspace` of `[iteration.envelope]`: a box in the base frame that no link origin and no tool point may
-/// leave. Infinite bounds (default) are inactive; for the floor, set only the lower bound of z.
+/// leave. Infinite bounds (default) are inactive. For a floor, set only the lower bound of z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -78,17 +79,17 @@ impl WorkspaceSettings {
 /// A watched point of the robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WatchedPoint {
-    /// The link of which it is the origin, or the tool.
+    /// The link of which the point is the origin, or the tool.
     pub link: String,
-    /// The joint that moves it.
+    /// The joint that moves the point.
     pub joint: String,
-    /// Position in that joint's frame, m.
+    /// Position of the point in the frame of that joint, m.
     pub offset_m: [f64; 3],
     #[serde(skip)]
     pub(super) body: usize,
 }
 
-/// A box in the base frame with the points that may not leave it.
+/// A box in the base frame with the points that must stay inside.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorkspaceBox {
     /// Lowest x, y, z, m; `None` if unbounded.
@@ -106,7 +107,7 @@ impl WorkspaceBox {
         Arrays::new(&self.model)
     }
 
-    /// The first point outside of the box at the positions `q`, rad (m), all joints in the model's order.
+    /// The first point outside the box at the positions `q`, rad (m), all joints in the model's order.
     pub(super) fn breach(&self, arrays: &mut Arrays, q: &[f64]) -> Option<SampleBreach> {
         let placements = body_placements(&self.model, arrays, q);
         self.points.iter().find_map(|point| {
@@ -130,7 +131,7 @@ impl WorkspaceBox {
         })
     }
 
-    /// The first breach if a motion is followed without error.
+    /// The first violation by a motion that is followed without tracking error.
     pub(super) fn broken_by(&self, reference: &Reference) -> Option<(usize, SampleBreach)> {
         self.first_of(&reference.motion().q, reference.samples())
     }

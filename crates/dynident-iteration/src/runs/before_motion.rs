@@ -1,4 +1,4 @@
-//! Preparation of a motion: its order among slower motions and warm-ups, and its rehearsal.
+//! Preparation of a motion: slower motions and warm-ups before it, and its rehearsal in simulation.
 
 use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
@@ -15,18 +15,18 @@ use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
 use std::borrow::Cow;
 
-/// A motion before a run (speed step, warm-up), or the run itself.
+/// A motion before a run (slow motion, warm-up), or the run itself.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Commanded<'a> {
     pub(crate) place: usize,
     pub(crate) leg: &'a Leg,
-    /// Share of the leg's speed.
+    /// Share of the trajectory's speed.
     pub(crate) speed: f64,
     pub(crate) purpose: RunPurpose,
 }
 
 impl<'a> Commanded<'a> {
-    /// Returns the commanded reference: that of the leg, slowed down to the share of its speed.
+    /// Returns the commanded reference: that of the trajectory, slowed down to the given share of its speed.
     pub(crate) fn reference(&self) -> Result<Cow<'a, Reference>, SimulationError> {
         let reference = self.leg.reference();
         if self.speed < 1.0 { reference.slowed(self.speed).map(Cow::Owned) } else { Ok(Cow::Borrowed(reference)) }
@@ -44,8 +44,8 @@ impl<'a> Commanded<'a> {
     }
 }
 
-/// The order of motions: each leg at each speed step (before the first completed run), each leg in each warm-up pass,
-/// then the run itself.
+/// The order of motions: each trajectory at each speed step (before the first completed run), each trajectory in each
+/// warm-up pass, then the run itself.
 pub(crate) fn motions<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
@@ -55,7 +55,7 @@ pub(crate) fn motions<'a>(
     let legs = |speed: f64, purpose: RunPurpose| {
         task.legs.iter().enumerate().map(move |(place, leg)| Commanded { place, leg, speed, purpose })
     };
-    // A run that was stopped early does not replace the speed steps.
+    // A run that was stopped early does not replace the motions at reduced speed.
     let is_first = !before.iter().any(|record| record.done);
     let steps = if is_first { &settings.safety.speed_steps[..] } else { &[] };
     let slow = steps.iter().filter(|&&step| step < 1.0).flat_map(|&step| legs(step, RunPurpose::Run));
@@ -63,7 +63,7 @@ pub(crate) fn motions<'a>(
     slow.chain(warm).chain(legs(1.0, RunPurpose::Run)).collect()
 }
 
-/// Paths from and to home for each leg; `None` if no home is set.
+/// Paths from and to the home posture for each trajectory; `None` if there is no home posture.
 ///
 /// # Errors
 /// No path to one of the legs.
@@ -80,7 +80,7 @@ pub(crate) fn ways_of(
     task.legs.iter().map(of_leg).collect()
 }
 
-/// Rehearses a plan if the settings request it. `robot` includes the selected friction.
+/// Simulates (rehearses) a plan if the settings request it. `robot` includes the selected friction.
 pub(crate) fn rehearsed<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
@@ -115,7 +115,8 @@ pub(crate) fn rehearsed<'a>(
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
         light: light.as_deref().filter(|_| known && own.or(shown).is_none()),
-        // The loop rate of drives is unknown; at the rate of the motion their loop may oscillate.
+        // The loop rate of the drives is unknown; simulated at the sampling rate of the motion, their loop could
+        // oscillate.
         oscillation: match controller {
             ControllerSettings::PositionLoop(_) => None,
             _ => settings.safety.oscillation.limits(robot.model()),

@@ -29,18 +29,18 @@ pub(crate) struct Prepared {
 pub(crate) enum MotionOutcome {
     Run(RobotRun),
     Stopped(IterationStatus),
-    /// The motion was interrupted or failed: its log if it had begun, and the reason.
+    /// The motion was interrupted or failed: its log if the motion had begun, and the reason.
     CutShort(Option<RobotRun>, CutShort),
 }
 
-/// Number of a leg of a run, which seeds its noise and names its folder.
+/// Number of a trajectory of a run. It determines the seed of the noise and the name of the folder.
 pub(crate) fn folder_number(run: usize, place: usize, legs: usize) -> usize {
     (run - 1) * legs + place + 1
 }
 
 impl Iteration {
-    /// Prepares controller, model, paths and rehearsal of a plan along the legs of `task`; or returns why it is not
-    /// commanded.
+    /// Prepares controller, model, paths and rehearsal of a plan along the trajectories of `task`, or returns why the
+    /// plan is not commanded.
     pub(crate) fn prepared(
         &self,
         task: &IterationTask,
@@ -139,7 +139,7 @@ impl Iteration {
                 MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
             }
             RobotStatus::Failed { .. } => cut_short(robot_run),
-            // A robot that did not move shows nothing about its controller.
+            // If a robot did not move, its log contains no information about the controller.
             RobotStatus::Stopped { .. } if !has_begun => cut_short(robot_run),
             RobotStatus::Interrupted { .. } => {
                 let how = robot_run.status.to_string();

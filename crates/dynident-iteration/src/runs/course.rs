@@ -18,24 +18,24 @@ use std::time::Instant;
 /// The result of an iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IterationOutcome {
-    /// How it ended.
+    /// How the iteration ended.
     pub status: IterationStatus,
-    /// Conditions of convergence that are not met; empty if it has converged.
+    /// Conditions of convergence that are not met; empty if the iteration has converged.
     pub shortfalls: Vec<UnmetCondition>,
-    /// Every run.
+    /// All runs, in order.
     pub runs: Vec<RunRecord>,
-    /// Forecast for a further run, if all conditions are met and its gain was too small.
+    /// Forecast for a further run, if all conditions are met and the forecast gain was too small.
     pub declined: Option<MotionForecast>,
 }
 
-/// Runs, identifies and repeats until tracking and parameters have converged. The first run uses a controller without a
-/// model, or the nominal model; later runs use the model-based controller with the newest estimate. A run that got
-/// worse (worse tracking, a broken limit, divergence) is rejected and the step from the last good parameters to the new
-/// ones is halved; if that does not help, the iteration falls back to the controller without a model, with higher
-/// gains.
+/// Runs, identifies and repeats until tracking and parameters have converged. The first run uses a controller without
+/// a model, or with the nominal model; later runs use the model-based controller with the newest estimate. A run that
+/// is worse (worse tracking, a violated limit, divergence) is rejected, and the change from the last good parameters
+/// to the new ones is halved. If that does not help, the iteration uses the controller without a model again, with
+/// higher gains.
 ///
-/// `robots` contains one robot for all legs, or one per leg. With a `store`, stored runs are not repeated, and each new
-/// run is stored before the next begins. `watch` is called after every new run.
+/// `robots` contains one robot for all trajectories, or one per trajectory. With a `store`, stored runs are not
+/// repeated, and each new run is stored before the next begins. `watch` is called after every new run.
 ///
 /// # Errors
 /// Settings that do not fit together, files that cannot be written. Faults of the robot are reported in the records and
@@ -49,7 +49,7 @@ pub fn iterate(
     iterate_supervised(iteration, robots, store, &mut Watching(watch))
 }
 
-/// [`iterate()`] with a supervisor, who may stop it and must permit every motion. A run that is
+/// Like [`iterate()`], with a supervisor, who can stop the iteration and must permit every motion. A run that is
 /// stopped is not used: its log is kept in a separate folder, and the next call repeats the run.
 ///
 /// # Errors
@@ -70,7 +70,7 @@ pub fn iterate_supervised(
         if let Some(status) = course.waits(supervisor)? {
             return course.outcome(status);
         }
-        // Validate the newest model before it is used further.
+        // The newest model is validated before it is used further.
         if let Some(held_out) = iteration.held_out_due(&course.records)? {
             if let Some(status) = course.run_held_out(held_out, &mut *robots[0], supervisor)? {
                 return course.outcome(status);
@@ -91,7 +91,7 @@ pub fn iterate_supervised(
     }
 }
 
-/// Returns the records of earlier calls, without those whose logs were corrected since.
+/// Returns the records of earlier calls, except those whose logs were corrected since.
 fn known_records(
     iteration: &Iteration,
     robots: &[&mut dyn Robot],
@@ -118,7 +118,7 @@ fn known_records(
 enum NextStep {
     Run(RunPlan, NextRunMotion),
     Finished(IterationStatus),
-    /// All conditions are met, and the predicted gain of a further run is too small.
+    /// All conditions are met, and the forecast gain of a further run is too small.
     Declined(IterationStatus, Option<MotionForecast>),
 }
 
@@ -206,7 +206,7 @@ impl Course<'_> {
         supervisor: &mut dyn Supervisor,
     ) -> Result<Option<IterationStatus>, IterationError> {
         let Self { iteration, store, records, .. } = self;
-        // Load the logs only now: an iteration that has ended needs none.
+        // The logs are loaded only now, because an iteration that has ended needs none.
         let good = match &mut self.good {
             Some(good) => good,
             None => self.good.insert(iteration.good_logs(records, *store)?),

@@ -26,7 +26,8 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::time::Instant;
 
-/// The motion of a run: its own trajectories, if they differ from the task's, and the forecast of their information.
+/// The motion of a run: its own trajectories, if they differ from those of the task, and the forecast of the error
+/// bars.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NextRunMotion {
     pub(crate) motion: Option<RunMotion>,
@@ -54,7 +55,7 @@ impl Iteration {
     ) -> Result<NextRunMotion, IterationError> {
         let good = records.iter().rev().find(|record| record.accepted && record.estimate.is_some());
         let (Some(planner), Some(good)) = (&self.planner, good) else { return Ok(NextRunMotion::default()) };
-        // After a rejected run, the last motion that the robot followed.
+        // After a rejected run, the last motion that the robot followed is used.
         if good.run != records.len() {
             return Ok(NextRunMotion { motion: good.motion.clone(), forecast: None });
         }
@@ -74,7 +75,8 @@ impl Iteration {
         Ok(NextRunMotion { motion: motion.or_else(|| good.motion.clone()), forecast: Some(forecast) })
     }
 
-    /// Returns a run for an additional motion, if the iteration has converged, motions are planned, and a run is left.
+    /// Returns a run for an additional motion, if the iteration has converged, motions are planned, and the number of
+    /// runs permits another one.
     pub(crate) fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
         open.then(|| next_step::further(records, &self.settings.settled.verdict)).flatten()
@@ -145,8 +147,8 @@ impl Iteration {
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
 
-    /// Examines a finished run: the estimate from the run alone and with the earlier good runs, and the evidence in its
-    /// log.
+    /// Examines a finished run: computes the estimate from the run alone and together with the earlier good runs, and
+    /// the evidence in its log.
     fn examine(
         &self,
         record: &mut RunRecord,
@@ -196,7 +198,7 @@ impl Iteration {
         let before_it = if self.settings.pool { earlier } else { &[] };
         let runs: Vec<RunLog<'_>> = before_it.iter().map(GoodLog::as_run).chain([run]).collect();
         if runs.len() > 1 {
-            // If the joint fit fails, the estimate of the newest run is used.
+            // If the fit of all runs together fails, the estimate of the newest run is used.
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
@@ -204,7 +206,7 @@ impl Iteration {
         let task = IterationTask { legs: legs.clone(), ..task.into_owned() };
         let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
-        // The first good run is not checked against its tracking floor or for other lengths.
+        // Tracking floor and other link lengths are not evaluated for the first good run.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
             add_tracking_floors(evidence, &task, records, &self.settings, after, in_force.friction.before(), errors);
@@ -300,7 +302,7 @@ impl Iteration {
         }))
     }
 
-    /// Returns the logs of the good runs among `records` from the store, for the joint identification.
+    /// Returns the logs of the good runs among `records` from the store, for the fit of all runs together.
     pub(crate) fn good_logs(
         &self,
         records: &[RunRecord],

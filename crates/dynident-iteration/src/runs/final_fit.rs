@@ -10,8 +10,9 @@ use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
     /// Returns the task with which [`identify`](dynident_identification::identify()) computes the result of the
-    /// iteration: the logs of all good runs in the store (only the last if runs are not pooled), each weighted by its
-    /// own noise, all joints at once, no parameter fixed. `None` without a good run.
+    /// iteration. It contains the logs of all good runs in the store (only the last if runs are not fitted together),
+    /// each weighted by its own noise. All joints are fitted at once, and no parameter is fixed. `None` without a
+    /// good run.
     ///
     /// # Errors
     /// Logs that are missing in the store, records of another robot.

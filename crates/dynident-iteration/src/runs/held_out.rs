@@ -44,8 +44,8 @@ impl Iteration {
         Ok(self)
     }
 
-    /// Returns the held-out motion if the newest model has to be validated now: after every N runs, and if no other
-    /// condition is unmet.
+    /// Returns the held-out motion if the newest model has to be validated now: after every N runs, and when all
+    /// other conditions are met.
     pub(crate) fn held_out_due(&self, records: &[RunRecord]) -> Result<Option<&HeldOutMotion>, IterationError> {
         let (Some(held_out), Some(last)) = (&self.held_out, records.last()) else { return Ok(None) };
         let has_model = last.knowledge().and_then(RunEstimate::for_controller).is_some();
@@ -123,7 +123,8 @@ impl Iteration {
     }
 }
 
-/// Settings for a held-out log: those of the last run, with the differentiator that it selected.
+/// Settings for the log of a held-out motion: those of the last run, with the differentiator that was selected for
+/// it.
 pub(crate) fn held_out_settings<'a>(
     settings: &'a RunIdentificationSettings,
     records: &[RunRecord],

@@ -19,7 +19,7 @@ use dynident_simulation::controllers::ControllerModel;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Ratio of torque to limit above which the limit is exceeded; allows for rounding.
+/// Ratio of torque to limit above which the limit is violated; slightly above 1 because of rounding.
 const MAX_TORQUE_LIMIT_RATIO: f64 = 1.001;
 
 /// A task with its settings; [`iterate()`](crate::iterate()) executes it.
@@ -60,12 +60,12 @@ impl Iteration {
         &self.settings
     }
 
-    /// Lowest oscillation frequency that is detected, Hz.
+    /// Lowest frequency at which oscillations are detected, Hz.
     pub(crate) fn lowest_oscillation_hz(&self) -> f64 {
         self.settings.safety.oscillation.lowest_hz(self.task.robot.model())
     }
 
-    /// Returns the legs of a run: those of the task, or along the run's own trajectories if it had some.
+    /// Returns the trajectories of a run: those of the task, or the run's own trajectories.
     ///
     /// # Errors
     /// A record of another task.
@@ -73,8 +73,8 @@ impl Iteration {
         legs_along(&self.task, record.motion.as_ref())
     }
 
-    /// Returns the next step, as a pure function of these records. With a motion planner, a converged iteration may
-    /// continue with a motion that is worth a run.
+    /// Returns the next step, as a pure function of these records. With a motion planner, an iteration that has
+    /// converged can continue with a motion whose forecast gain is large enough.
     ///
     /// # Errors
     /// Records of another robot.
@@ -99,7 +99,8 @@ impl Iteration {
         Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
     }
 
-    /// Names of joints and parameters, and the torque share of each parameter along the motion of the last run.
+    /// Names of joints and parameters, and the share of each parameter in the torque along the motion of the last
+    /// run.
     pub(crate) fn names(&self, robot: &ParametricModel, records: &[RunRecord]) -> Result<Names, IterationError> {
         let shown = records.last().and_then(|last| Some((last, last.evidence.as_ref()?)));
         let shares = match shown {
@@ -119,7 +120,7 @@ impl Iteration {
         })
     }
 
-    /// Checks whether the trajectories need more torque than the joint limits, according to the last good model.
+    /// Checks whether, according to the last good model, the trajectories need more torque than the joint limits.
     fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
         let Some(limits) = &self.task.torque_limits else { return Ok(None) };
         let good = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);

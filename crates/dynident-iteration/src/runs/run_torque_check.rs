@@ -39,7 +39,7 @@ impl Iteration {
         });
         let legs: Vec<Leg> = self.legs_of(record)?.into_owned();
         let (controller, model) = (&prepared.controller, prepared.model.as_ref());
-        // A run that ended early may have fewer records than legs.
+        // A run that ended early can have fewer records than trajectories.
         let newest = CheckedRun { legs: &legs, records, controller, model };
         let runs: Vec<CheckedRun<'_>> = earlier_runs.chain([newest]).collect();
         let feeds_forward_later =

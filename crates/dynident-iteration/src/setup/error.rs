@@ -1,4 +1,5 @@
-//! Errors of an iteration. Its outcome is a status, not an error: see [`IterationStatus`](crate::IterationStatus).
+//! Errors of an iteration. The outcome of an iteration is a status, not an error: see
+//! [`IterationStatus`](crate::IterationStatus).
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
@@ -24,9 +25,9 @@ pub enum IterationError {
         "the friction that run {run} selected does not fit this robot: {source}; start afresh, or use another folder"
     )]
     ChosenFriction {
-        /// The run.
+        /// Number of the run.
         run: usize,
-        /// The mismatch.
+        /// Reason for the mismatch.
         source: ParametricModelError,
     },
     /// Rows that are not sufficient for a model.
@@ -42,7 +43,7 @@ pub enum IterationError {
     /// joints follow the motion. The text after the joints has the cause.
     #[error("the record of the run (joints {}): {problem}", joints.join(", "))]
     Record {
-        /// Its joints.
+        /// Names of the joints.
         joints: Vec<String>,
         /// The problem and its fix.
         problem: String,
@@ -51,7 +52,7 @@ pub enum IterationError {
     /// of these runs.
     #[error("run {run}: {problem}")]
     Planning {
-        /// The run.
+        /// Number of the run.
         run: usize,
         /// The problem and its fix.
         problem: String,
@@ -60,7 +61,7 @@ pub enum IterationError {
     /// unchanged.
     #[error("{}: {source}; existing files are unchanged", path.display())]
     File {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,

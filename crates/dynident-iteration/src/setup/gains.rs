@@ -12,8 +12,8 @@ use dynident_simulation::{PerJoint, Reference, SimulationError, require};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Damping ratio of a joint whose drive may be too light for critical damping: half of the velocity gain at the same
-/// stiffness.
+/// Damping ratio of a joint whose drive may be too light for critical damping: the velocity gain is halved at the
+/// same stiffness.
 const LIGHT_DAMPING: f64 = 0.5;
 
 /// Number of postures along each motion at which the inertia is evaluated.
@@ -22,22 +22,23 @@ const POSTURES: usize = 200;
 /// Settings of the derived gains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GainSettings {
-    /// Natural frequency of each joint, Hz.
+    /// Natural frequency of each joint's loop, Hz.
     pub bandwidth_hz: PerJoint,
-    /// Uncertainty of the nominal inertia, percent: the robot may be lighter by this.
+    /// Uncertainty of the nominal inertia, percent: the robot may be lighter by this percentage.
     pub uncertainty_percent: f64,
     /// Largest delay of the control loop, s.
     pub delay_s: f64,
-    /// Smallest possible inertia of a drive without described inertia, as a share of the typical inertia; the loop must
-    /// be stable with it.
+    /// Smallest possible inertia of a drive, as a share of a typical drive inertia, if the robot description contains
+    /// no drive inertia; the loop must be stable with it.
     pub lightest_drive: f64,
     /// Largest delay of the control loop for joints with unknown drive inertia, s.
     pub light_delay_s: f64,
-    /// Largest deviation from the path before a run is stopped, rad (m); `None` for the default of the envelope.
+    /// Largest deviation from the path before a run is stopped, rad (m); `None` for the default of the safety
+    /// envelope.
     pub tracking_error: Option<PerJoint>,
 }
 
-/// Controllers with gains from the nominal model and a bandwidth.
+/// Controllers with gains derived from the nominal model and a bandwidth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DerivedControllers {
     /// Joint PD.
@@ -48,11 +49,12 @@ pub struct DerivedControllers {
     pub first_model: Option<Vec<f64>>,
     /// Computed torque with the newest model.
     pub model_based: ControllerSettings,
-    /// Natural frequency of each joint without a model, Hz: the requested one, or the highest that the delay allows.
+    /// Natural frequency of each joint with the controller without a model, Hz: the requested one, or the highest
+    /// that the delay allows.
     pub model_free_hz: Vec<f64>,
     /// Natural frequency of each joint with the nominal model, Hz.
     pub first_hz: Vec<f64>,
-    /// Natural frequency of each joint with the newest model, Hz.
+    /// Natural frequency of each joint with the newest identified model, Hz.
     pub model_based_hz: Vec<f64>,
 }
 
@@ -88,27 +90,29 @@ pub fn lowered_bandwidths(
     names.iter().zip(given_hz).enumerate().map(of_joint).filter(is_lower).collect()
 }
 
-/// Derives critically damped controllers for a robot with nominal bodies; the natural frequency of each joint is `ω =
-/// 2π bandwidth`:
+/// Derives critically damped controllers for a robot with nominal bodies. The natural frequency of each joint is `ω =
+/// 2π bandwidth`, `M` is the mass matrix:
 ///
-/// * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
-/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; without described drive
-///   inertia, the model and M_jj use that of a typical drive (the effort limit accelerates it by 300 rad/s²);
+/// * joint PD: `K_p = ω² m`, `K_d = 2 ω m` with `m = (1 - uncertainty) max M_jj(q)` along the motions;
+/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`. If the robot description
+/// has no drive inertia, the model and M_jj include a typical drive inertia (which the effort limit accelerates by
+/// 300 rad/s²);
 /// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
-/// So the lightest robot within the uncertainty is not faster than requested: under computed torque in all postures,
-/// under joint PD in the posture with the largest inertia of the joint (in others it is faster, and overdamped). A
-/// heavier robot is slower and sags more; the rehearsal shows whether it follows well enough.
+/// So the lightest robot within the uncertainty is not faster than requested. Under computed torque this is true in
+/// all postures, under joint PD in the posture with the largest inertia of the joint (in other postures it is faster,
+/// and overdamped). A heavier robot is slower and sags more; the rehearsal in simulation shows whether it follows
+/// well enough.
 ///
-/// A delayed loop becomes unstable where it is fast: under joint PD, a folded arm has a tenth of the inertia for which
-/// the gains are designed. So `ω` is reduced, first for each joint, then for all together, until every posture along
-/// the motions has a phase margin of 30 degrees at this delay. It is never increased.
+/// A loop with delay becomes unstable if it is too fast. Under joint PD, a folded arm can have a tenth of the inertia
+/// for which the gains are designed. So `ω` is reduced, first for each joint, then for all together, until every
+/// posture along the motions has a phase margin of 30 degrees at this delay. It is never increased.
 ///
-/// A drive without described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
-/// typical inertia, which makes the loop ten times as fast. With `lightest_drive` times the typical inertia and a delay
-/// of `light_delay_s`, each joint keeps a phase margin of 15 degrees: where necessary its damping is halved and `ω`
-/// reduced. `ω` stays high enough that typical friction (5 % of the effort limit, and as much at full velocity) holds
-/// the joint at most 80 % of `tracking_error` from its path.
+/// A drive whose inertia is not in the robot description can be much lighter than a typical one: a gripper of 30 Nm
+/// had a tenth of the typical inertia, which makes the loop ten times as fast. With `lightest_drive` times the
+/// typical inertia and a delay of `light_delay_s`, each joint must keep a phase margin of 15 degrees. Where
+/// necessary, its damping is halved and `ω` reduced. `ω` stays high enough that typical friction (5 % of the effort
+/// limit, and as much at full velocity) keeps the joint at most 80 % of `tracking_error` away from its path.
 ///
 /// # Errors
 /// A bandwidth that is not positive, an uncertainty of 100 % or more, a nominal model without inertia, or a negative
@@ -139,7 +143,7 @@ pub fn derived_controllers(
     let lowered = |ratio: &dyn Fn(usize) -> f64| -> Vec<f64> {
         asked.iter().enumerate().map(|(joint, asked)| asked.min(highest_omega(ratio(joint), delay_s))).collect()
     };
-    // Computed torque with a model that is heavier than the robot.
+    // Computed torque with a model that is heavier than the robot makes the loop faster.
     let first_model = with_typical_inertia(robot);
     let drives = if first_model.is_some() { TIMES_THE_LIGHTEST } else { 1.0 };
     let with_model = lowered(&|_| 1.0 / left);
@@ -152,7 +156,7 @@ pub fn derived_controllers(
         None => Loops { omega, damping: vec![1.0; dof] },
     };
     let with_nominal = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
-    // Joint PD in the posture with the lowest inertia of the joint, other joints free.
+    // Joint PD in the posture with the lowest inertia of the joint, with the other joints free.
     let pd_ratios = |matrices: &[DMatrix<f64>]| -> Vec<f64> {
         largest.iter().zip(lightest_inertia(matrices, dof)).map(|(most, least)| (most / least).max(1.0)).collect()
     };
@@ -184,8 +188,8 @@ struct Loops {
 }
 
 impl Loops {
-    /// Loops that stay stable with the lightest drives, whose inertia is the modelled one divided by `ratios`, but not
-    /// slower than `stiff`.
+    /// Loops that stay stable with the lightest drives, but not slower than `stiff`. The inertia with the lightest
+    /// drives is the modelled inertia divided by `ratios`.
     fn stable(omega: Vec<f64>, ratios: &[f64], stiff: &[f64], light_delay_s: f64) -> Self {
         let of_joint = |((omega, &ratio), stiff): ((f64, &f64), &f64)| {
             if omega <= highest_omega_if_light(ratio, light_delay_s, 1.0) {
@@ -224,7 +228,7 @@ impl Loops {
     }
 }
 
-/// Largest inertia about each joint, other joints fixed.
+/// Largest inertia about each joint, with the other joints fixed.
 fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result<Vec<f64>, SimulationError> {
     let mut largest = vec![0.0_f64; robot.dof()];
     for matrix in matrices {
@@ -242,8 +246,8 @@ fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result
     Ok(largest)
 }
 
-/// Natural frequency of each joint at which typical friction would hold it 80 % of the largest tracking error from its
-/// path, rad/s: `√(F / (left · M_jj · e))`; 0 for a joint with unknown effort limit.
+/// Natural frequency of each joint at which typical friction F would keep it 80 % of the largest tracking error away
+/// from its path, rad/s: `√(F / (left · M_jj · e))`. It is 0 for a joint with unknown effort limit.
 fn stiff_enough(
     robot: &ParametricModel,
     matrices: &[DMatrix<f64>],
@@ -261,8 +265,8 @@ fn stiff_enough(
     robot.model().joints().iter().enumerate().map(of_joint).collect()
 }
 
-/// Ratio of actual to commanded acceleration of each joint under computed torque with `matrices` if the true inertia is
-/// `light`: the largest `(M_light⁻¹ M)_jj`, at least 1.
+/// Ratio of actual to commanded acceleration of each joint under computed torque with the mass matrices `matrices`,
+/// if the true ones are `light`: the largest `(M_light⁻¹ M)_jj`, at least 1.
 fn inertia_ratios(matrices: &[DMatrix<f64>], light: &[DMatrix<f64>], dof: usize) -> Vec<f64> {
     let mut ratios = vec![1.0_f64; dof];
     for (matrix, light) in matrices.iter().zip(light) {

@@ -1,4 +1,4 @@
-//! The home posture between runs, and the approach and return paths between home and a motion.
+//! The home posture between runs, and the approach and return paths between the home posture and a motion.
 
 use crate::robot::{ApproachPaths, Envelope};
 use dynident_excitation::Motion;
@@ -9,22 +9,22 @@ use dynident_model::sample::Random;
 use dynident_simulation::{Reference, SimulationError, require, require_length};
 use thiserror::Error;
 
-/// Largest numbers of random via postures, and of pairs of them, that are tried if the direct path is not clear.
+/// Maximum number of random via postures, and of pairs of them, that are tested if the direct path violates a limit.
 const POSTURES_TRIED: usize = 500;
 const PAIRS_TRIED: usize = 5000;
 
-/// Seed of the via postures; a resumed iteration finds the same paths.
+/// Fixed seed of the via postures, so that a resumed iteration finds the same paths.
 const SEED: u64 = 1;
 
-/// Samples of a straight segment in the quick check before the full check.
+/// Number of samples of a straight segment in the quick check before the full check.
 const QUICK_CHECK_SAMPLES: usize = 60;
 
-/// Braking time at the motion's highest acceleration, in samples, below which an end of the motion is at rest: the last
-/// sample need not be the exact end of the trajectory.
+/// An end of the motion is at rest if braking from its velocity at the motion's highest acceleration takes at most
+/// this number of samples: the last sample need not be the exact end of the trajectory.
 const MAX_BRAKING_SAMPLES: f64 = 2.0;
 
-/// Path lengths are multiples of this number of samples, so that a log at a lower rate has a sample where the motion
-/// begins.
+/// Numbers of samples of a path are multiples of this number, so that a log at a lower rate has a sample where the
+/// motion begins.
 const PATH_LENGTH_MULTIPLE: f64 = 100.0;
 
 /// The home posture and how the robot moves between it and a motion.
@@ -35,7 +35,7 @@ pub struct HomeSettings {
     /// Share of the velocity and acceleration limits that the paths use; see [`ways`](Self::ways). Default in studies
     /// 0.2.
     pub speed: f64,
-    /// Limits of the paths: joints, floor, distances of links. Torques are those of the nominal model.
+    /// Limits of the paths: joints, floor, distances between links. Torques are those of the nominal model.
     pub limits: Limits,
     /// Uncertainty of the nominal torque, percent; the torque limits are reduced by it.
     pub uncertainty_percent: f64,
@@ -63,22 +63,22 @@ pub enum HomeError {
     NotAtRest {
         /// The joint.
         joint: String,
-        /// Its velocity there, rad/s (m/s).
+        /// Velocity of the joint there, rad/s (m/s).
         speed: f64,
-        /// Whether this is the begin of the motion.
+        /// True at the beginning of the motion, false at its end.
         begins: bool,
     },
     /// The home posture or the start of the motion is outside a limit, so that no path can reach it. Change the posture
     /// or the limit.
     #[error("{posture} itself breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
     Posture {
-        /// The posture.
+        /// Which posture violates the limit.
         posture: &'static str,
         /// Kind of limit.
         kind: LimitKind,
         /// Joint, point or pair of links.
         subject: String,
-        /// Value over limit.
+        /// Ratio of value to limit.
         ratio: f64,
         /// Suggested fix.
         fix: &'static str,
@@ -90,15 +90,15 @@ pub enum HomeError {
         100.0 * .share
     )]
     NotClear {
-        /// The posture at the other end.
+        /// Which posture is at the other end of the path.
         posture: &'static str,
         /// Kind of limit.
         kind: LimitKind,
         /// Joint, point or pair of links.
         subject: String,
-        /// Position on the direct path from home, 0 to 1.
+        /// Place on the direct path from the home posture, as a share from 0 to 1.
         share: f64,
-        /// Value over limit.
+        /// Ratio of value to limit.
         ratio: f64,
         /// Number of random postures that were tried.
         tried: usize,
@@ -119,7 +119,7 @@ pub enum HomeError {
 pub struct FoundPaths {
     /// The paths.
     pub ways: ApproachPaths,
-    /// Via postures of each path, rad (m), in order from home; empty for a direct path.
+    /// Via postures of each path, rad (m), in order from the home posture; empty for a direct path.
     pub over: [Vec<Vec<f64>>; 2],
 }
 
@@ -137,12 +137,13 @@ impl HomeSettings {
         require(speed > 0.0 && speed <= 1.0, "approach_speed", speed, "give a share of the limits: above 0, at most 1")
     }
 
-    /// Plans the paths from home to the begin of `motion` and from its end to home. Each path is a quintic in joint
-    /// space from rest to rest, with zero acceleration at both ends. Every joint uses at most the share
-    /// [`speed`](Self::speed) of its velocity and acceleration limits (and of the velocity limit of the envelope);
-    /// without a limit, of the maximum of the motion. If the direct path breaks a limit, the path goes through one or
-    /// two random via postures (at most 500, fixed seed), at rest in each. All limits are checked by [`check_limits`].
-    /// If the robot is already there the path has one sample.
+    /// Plans the paths from the home posture to the beginning of `motion`, and from its end to the home posture. Each
+    /// path is a quintic polynomial in joint space from rest to rest, with zero acceleration at both ends. Every
+    /// joint uses at most the share [`speed`](Self::speed) of its velocity and acceleration limits (and of the
+    /// velocity limit of the safety envelope); without a limit, of the maximum in the motion. If the direct path
+    /// violates a limit, the path goes through one or two random via postures (at most 500 are tested, with a fixed
+    /// seed), at rest in each. All limits are checked by [`check_limits`]. If the robot is already there, the path
+    /// has one sample.
     ///
     /// # Errors
     /// No path exists; nothing has moved.
@@ -155,7 +156,7 @@ impl HomeSettings {
         self.ways_until(model, motion, envelope, &|| false)
     }
 
-    /// As [`ways`](Self::ways), but the search ends with [`HomeError::Interrupted`] once `stop` returns true.
+    /// Like [`ways`](Self::ways), but the search ends with [`HomeError::Interrupted`] once `stop` returns true.
     ///
     /// # Errors
     /// As [`ways`](Self::ways).
@@ -285,8 +286,8 @@ impl<'a> Planner<'a> {
         let from = &self.home.posture;
         let straight = self.piece(from, to)?;
         let Some(broken) = self.broken(&straight)? else { return Ok((straight, Vec::new())) };
-        // Postures that are reachable directly from home, or from the other end; a path uses one posture of both kinds,
-        // or one of each.
+        // Postures that are reachable directly from the home posture, or from the other end. A path uses one posture
+        // that is in both lists, or one of each.
         let (mut from_home, mut to_end): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         let mut random = Random::new(SEED);
         let mut pairs = 0;
@@ -338,8 +339,8 @@ impl<'a> Planner<'a> {
         Ok(self.looks_clear(&self.piece(from, to)?))
     }
 
-    /// A random via posture: first near the direct path, then farther away, within the position limits or, without
-    /// limits, half a turn (1 m) beyond the path.
+    /// A random via posture: first near the direct path, then farther away. It is within the position limits; without
+    /// limits, within half a turn (1 m) beyond the path.
     fn between(&self, from: &[f64], to: &[f64], tried: usize, random: &mut Random) -> Vec<f64> {
         let reach = (tried + 1) as f64 / POSTURES_TRIED as f64;
         let joints = self.model.joints().iter().enumerate();
@@ -354,7 +355,7 @@ impl<'a> Planner<'a> {
         joints.map(one).collect()
     }
 
-    /// A quintic from rest to rest; one sample if nothing moves.
+    /// A quintic polynomial from rest to rest; one sample if nothing moves.
     fn piece(&self, from: &[f64], to: &[f64]) -> Result<Motion, HomeError> {
         let mut duration_s = 0.0_f64;
         for (place, joint) in self.model.joints().iter().enumerate() {
@@ -383,7 +384,7 @@ impl<'a> Planner<'a> {
                 let x = sample as f64 / periods.max(1) as f64;
                 let [share, first, second, third] = quintic(x);
                 let (way, per_s) = (to[joint] - from[joint], self.rate_hz / periods.max(1) as f64);
-                // Exact positions at both ends.
+                // The positions at both ends are set exactly.
                 motion.q[at] = if sample == periods { to[joint] } else { from[joint] + share * way };
                 motion.dq[at] = first * way * per_s;
                 motion.ddq[at] = second * way * per_s * per_s;
@@ -393,7 +394,7 @@ impl<'a> Planner<'a> {
         Ok(motion)
     }
 
-    /// Checks the limits at a few samples of a segment; a necessary condition only.
+    /// Checks the limits at a few samples of a segment; this is only a necessary condition.
     fn looks_clear(&self, piece: &Motion) -> bool {
         let mut some = Motion::default();
         some.reset(piece.joints, QUICK_CHECK_SAMPLES);
@@ -410,13 +411,13 @@ impl<'a> Planner<'a> {
         values.iter().all(|value| *value <= 0.0)
     }
 
-    /// Returns the worst violated limit of a path, if any. The check rate is that of motions, scaled by the speed of
-    /// the path, but at least the sample rate.
+    /// Returns the worst violated limit of a path, if any. The rate of the check is that for motions, scaled by the
+    /// speed of the path, but at least the sampling rate.
     fn broken(&self, way: &Motion) -> Result<Option<LimitReport>, HomeError> {
         self.check_stop()?;
         let check_hz = self.home.speed * self.model.characteristic_scale().round_hertz(CHECK_RATE_HZ);
         let rate_hz = check_hz.max(self.rate_hz);
-        // A posture is checked once.
+        // A path of a single posture is checked once.
         let duration_s = ((way.samples - 1) as f64 / self.rate_hz).max(1.0 / rate_hz);
         let at = |times: &[f64], out: &mut Motion| {
             out.reset(way.joints, times.len());
@@ -438,7 +439,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Highest velocity and acceleration of the quintic for unit distance and unit time.
+/// Highest velocity and acceleration of the quintic polynomial for unit distance and unit time.
 const QUINTIC_MAX_VELOCITY: f64 = 1.875;
 const QUINTIC_MAX_ACCELERATION: f64 = 5.773_502_691_896_258;
 

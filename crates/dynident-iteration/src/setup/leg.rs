@@ -4,8 +4,7 @@ use dynident_simulation::Reference;
 use dynident_simulation::{SimulationError, require, require_length};
 use std::sync::Arc;
 
-/// One trajectory of a run. The paper moves joint 2 and then joint 1: this is one leg in which the joints move one
-/// after the other, or two legs.
+/// One trajectory of a run. A motion of one joint after the other can be one trajectory or several.
 #[derive(Clone, Debug)]
 pub struct Leg {
     reference: Reference,
@@ -16,7 +15,7 @@ pub struct Leg {
 }
 
 impl Leg {
-    /// Creates a leg of which all samples of all joints are used.
+    /// Creates a trajectory of which all samples of all joints are used.
     ///
     /// # Errors
     /// A reference with a single sample.
@@ -24,8 +23,8 @@ impl Leg {
         Self::new(reference, None)
     }
 
-    /// Creates a leg of which the torque of joint j is used only in the time intervals `windows[j]` (from, to; s): the
-    /// paper's ±δ around mid-strokes, while the joint moves alone.
+    /// Creates a trajectory of which the torque of joint j is used only in the time intervals `windows[j]` (from, to;
+    /// s), for example around the middle of a move in which only this joint moves.
     ///
     /// # Errors
     /// A reference with a single sample.
@@ -43,7 +42,7 @@ impl Leg {
         Ok(Self { reference, commanded, windows, differentiator: None, payload: None })
     }
 
-    /// Returns a copy along another trajectory, with the same windows, payload and custom differentiator.
+    /// Returns a copy along another reference, with the same windows, payload and custom differentiator.
     ///
     /// # Errors
     /// A reference with a single sample.
@@ -52,28 +51,28 @@ impl Leg {
         Ok(Self { differentiator: self.differentiator.clone(), payload: self.payload.clone(), ..other })
     }
 
-    /// Replaces the commanded motion for differentiators: strokes in closed form instead of samples.
+    /// Replaces the commanded motion that differentiators use: logistic functions in closed form instead of samples.
     #[must_use]
     pub fn with_commanded(mut self, commanded: dynident_recording::Reference) -> Self {
         self.commanded = Arc::new(commanded);
         self
     }
 
-    /// Sets a custom differentiator, which replaces that of the settings.
+    /// Sets a custom differentiator, which replaces the differentiator of the settings.
     #[must_use]
     pub fn with_differentiator(mut self, differentiator: Arc<dyn Differentiator>) -> Self {
         self.differentiator = Some(differentiator);
         self
     }
 
-    /// Sets the payload of the robot, by its name among the settings' payloads.
+    /// Sets the payload of the robot, by its name among the payloads of the settings.
     #[must_use]
     pub fn with_payload(mut self, payload: Option<String>) -> Self {
         self.payload = payload;
         self
     }
 
-    /// Name of the payload.
+    /// Name of the robot's payload in this trajectory, if any.
     pub fn payload(&self) -> Option<&str> {
         self.payload.as_deref()
     }
@@ -83,7 +82,7 @@ impl Leg {
         &self.reference
     }
 
-    /// The commanded motion for differentiators.
+    /// The commanded motion that differentiators use.
     pub fn commanded(&self) -> &Arc<dynident_recording::Reference> {
         &self.commanded
     }
@@ -110,13 +109,13 @@ impl Leg {
 pub struct IterationTask {
     /// The robot.
     pub robot: ParametricModel,
-    /// The trajectories of every run, in order; of the first run only if motions are [planned](crate::MotionPlanner).
+    /// The trajectories of every run, in order; only of the first run if motions are [planned](crate::MotionPlanner).
     pub legs: Vec<Leg>,
-    /// Base columns with known values: (index of the base column, value). Example: for the paper's joint 1, the values
-    /// estimated from joint 2.
+    /// Base columns with known values: (index of the base column, value). Example: values that were estimated from an
+    /// outer joint, for the identification of an inner joint.
     pub known: Vec<(usize, f64)>,
-    /// Torque limit of each joint, Nm (N), or infinity. A trajectory that needs more torque according to the estimated
-    /// model is refused at the end of the iteration.
+    /// Torque limit of each joint, Nm (N), or infinity. At the end of the iteration, a trajectory that needs more
+    /// torque according to the estimated model is rejected.
     pub torque_limits: Option<Vec<f64>>,
 }
 
@@ -129,7 +128,7 @@ impl IterationTask {
         Ok(Self { robot, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
     }
 
-    /// Checks that legs and known columns belong to the robot.
+    /// Checks that trajectories and known columns belong to the robot.
     ///
     /// # Errors
     /// No legs, wrong numbers of joints, empty windows, unknown columns, values that are not finite.

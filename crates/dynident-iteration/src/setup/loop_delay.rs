@@ -1,38 +1,40 @@
-//! Highest bandwidth of a joint's loop with a delayed controller.
+//! Highest bandwidth of a joint's loop if the controller has a delay.
 //!
-//! A joint of inertia `m` with `K_p = ω² m̂`, `K_d = 2 ω m̂` has the open loop `L(s) = r (2 ω s + ω²) e^(-τ s) / s²`,
-//! where `r = m̂ / m` is the ratio of the inertia in the gains to the true one and `τ` the delay. `|L| = 1` at
-//! `ω_c = x ω`, `x² = 2 r² + r √(4 r² + 1)`, where the phase margin is `atan 2x - ω_c τ` (Åström and Murray, *Feedback
-//! Systems*, 2008, chapter 9).
+//! A joint of inertia `m` with the gains `K_p = ω² m̂`, `K_d = 2 ω m̂` has the open loop `L(s) = r (2 ω s + ω²) e^(-τ
+//! s) / s²`. `r = m̂ / m` is the ratio of the inertia in the gains to the true inertia, `τ` the delay. At the
+//! crossover frequency `ω_c = x ω` with `x² = 2 r² + r √(4 r² + 1)`, the gain is `|L| = 1` and the phase margin is
+//! `atan 2x - ω_c τ` (Åström and Murray, *Feedback Systems*, 2008, chapter 9).
 
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest phase margin, rad: 30 degrees.
+/// Minimum phase margin, rad: 30 degrees.
 const MIN_PHASE_MARGIN_RAD: f64 = core::f64::consts::FRAC_PI_6;
 
-/// Highest natural frequency with that margin, rad/s; infinite without a delay.
+/// Highest natural frequency with the minimum phase margin, rad/s; infinite without a delay.
 pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
     omega_with_margin(ratio, delay_s, MIN_PHASE_MARGIN_RAD, 1.0)
 }
 
-/// Natural frequency at which a joint that is lighter than expected keeps half of that margin, rad/s, with `K_d = 2 ζ ω
-/// m̂` for a damping ratio `ζ`; infinite without a delay.
+/// Natural frequency at which a joint that is lighter than expected has half of the minimum phase margin, rad/s, with
+/// `K_d = 2 ζ ω m̂` for a damping ratio `ζ`; infinite without a delay.
 pub(crate) fn highest_omega_if_light(ratio: f64, delay_s: f64, damping: f64) -> f64 {
     omega_with_margin(ratio, delay_s, 0.5 * MIN_PHASE_MARGIN_RAD, damping)
 }
 
-/// With damping ratio `ζ` the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the margin `atan 2 ζ x - ω_c τ`.
+/// With damping ratio `ζ`, the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the phase margin is `atan 2 ζ x
+/// - ω_c τ`.
 fn omega_with_margin(ratio: f64, delay_s: f64, margin: f64, damping: f64) -> f64 {
     let damped = damping * damping * ratio;
     let crossover = (2.0 * damped * ratio + ratio * (4.0 * damped * damped + 1.0).sqrt()).sqrt();
     ((2.0 * damping * crossover).atan() - margin) / (crossover * delay_s)
 }
 
-/// Factor (at most 1) on the natural frequencies `omega` (rad/s) at which joints with velocity gains `kd` (Nms/rad)
-/// keep that margin in a posture with mass matrix `M`. `None` if `M` is not positive definite.
+/// Factor (at most 1) by which the natural frequencies `omega` (rad/s) must be multiplied so that joints with
+/// velocity gains `kd` (Nms/rad) keep the minimum phase margin in a posture with mass matrix `M`. `None` if `M` is
+/// not positive definite.
 ///
-/// The coupled loops may be too fast although each single loop is slow enough: the fastest motion of all joints crosses
-/// over at `λ`, the largest eigenvalue of `M⁻¹ K_d`, like a single joint with `r = λ / 2ω`.
+/// The coupled loops can be too fast although each single loop is slow enough. The fastest motion of all joints has
+/// its crossover at `λ`, the largest eigenvalue of `M⁻¹ K_d`, like a single joint with `r = λ / 2ω`.
 pub(crate) fn share_of_all(matrix: &DMatrix<f64>, kd: &[f64], omega: &[f64], delay_s: f64) -> Option<f64> {
     let root = DMatrix::from_diagonal(&DVector::from_iterator(kd.len(), kd.iter().map(|kd| kd.sqrt())));
     let fastest = (&root * matrix.clone().cholesky()?.inverse() * &root).symmetric_eigenvalues().max();

@@ -1,4 +1,5 @@
-//! Settings of an iteration, and the parts of a run that do not depend on data: legs, posture, home, warm-up.
+//! Settings of an iteration, and the parts of a run that do not depend on data: trajectories, posture, home posture,
+//! warm-up.
 
 pub(crate) mod error;
 pub(crate) mod gains;

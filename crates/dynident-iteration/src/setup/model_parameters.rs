@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub enum ModelParameters {
     /// All parameters: ten per body, then one per term.
     All(Vec<f64>),
-    /// One per base parameter.
+    /// One value per base parameter.
     Base(Vec<f64>),
 }
 
@@ -19,7 +19,7 @@ impl ModelParameters {
         }
     }
 
-    /// `good + share (new - good)`; `new` if the kinds differ.
+    /// Parameters between two sets: `good + share (new - good)`; `new` if the sets are of different kinds.
     pub(crate) fn between(good: &Self, new: &Self, share: f64) -> Self {
         let mixed = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
         match (good, new) {

@@ -2,7 +2,8 @@ use dynident_simulation::Reference;
 use dynident_simulation::controllers::ControllerModel;
 use nalgebra::DMatrix;
 
-/// `M(q)` including the inertia of the drives, column by column as `τ(q, 0, e_j) - τ(q, 0, 0)`, kg m² (kg).
+/// Mass matrix `M(q)` including the inertia of the drives, column by column as `τ(q, 0, e_j) - τ(q, 0, 0)`, kg m²
+/// (kg).
 pub(crate) fn inertia_matrix(model: &mut ControllerModel, q: &[f64]) -> DMatrix<f64> {
     let dof = q.len();
     let (zeros, mut unit) = (vec![0.0; dof], vec![0.0; dof]);
@@ -17,7 +18,7 @@ pub(crate) fn inertia_matrix(model: &mut ControllerModel, q: &[f64]) -> DMatrix<
             matrix[(row, joint)] = tau[row] - still[row];
         }
     }
-    // Remove rounding differences between both halves.
+    // Makes the matrix exactly symmetric; both halves differ by rounding.
     0.5 * (&matrix + matrix.transpose())
 }
 

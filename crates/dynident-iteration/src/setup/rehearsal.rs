@@ -1,5 +1,5 @@
-//! Rehearsal of a motion before it is commanded: its torque, the mass matrix of the controller's model, and the
-//! simulated closed loop with robots that deviate from the model.
+//! Rehearsal: simulation of a motion before it is commanded. It evaluates the torque of the motion, the mass matrix
+//! of the controller's model, and the closed loop with simulated robots that deviate from the model.
 
 use crate::robot::{Breach, Envelope, JointOscillation, RunOscillations};
 use crate::setup::posture::{at_sample, inertia_matrix};
@@ -17,14 +17,14 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use thiserror::Error;
 
-/// Smallest eigenvalue of the mass matrix relative to the largest; below it only rounding remains.
+/// Smallest accepted eigenvalue of the mass matrix relative to the largest; a smaller one is only rounding.
 const MIN_EIGENVALUE_RATIO: f64 = 1e-12;
-/// Default delay of an unknown controller, s, for an arm of 1.2 m.
+/// Default delay of a controller whose delay is unknown, s, for an arm of 1.2 m.
 const DELAY_S: f64 = 0.008;
-/// Default smallest share of the typical inertia of a drive without described inertia: a gripper with 30 Nm in its
-/// robot description had 0.01 kg m² instead of the typical 0.1.
+/// Default of the smallest inertia of a drive that the robot description does not contain, as a share of the typical
+/// inertia. A gripper with 30 Nm in its robot description had 0.01 kg m² instead of the typical 0.1.
 const LIGHTEST_DRIVE: f64 = 0.1;
-/// Largest delay in the settings, s.
+/// Largest accepted delay in the settings, s.
 const MAX_DELAY_S: f64 = 10.0;
 
 /// Settings of the rehearsal.
@@ -32,27 +32,27 @@ const MAX_DELAY_S: f64 = 10.0;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RehearsalSettings {
-    /// Largest deviation of the true robot from the model: each body and each parameter of friction and drives varies
-    /// by this percentage. Default 30.
+    /// Largest deviation of the simulated robots from the model, percent: each body and each parameter of friction
+    /// and drives varies by this percentage. Default 30.
     pub uncertainty_percent: f64,
-    /// Number of deviating robots that are simulated in addition to the model. Default 4.
+    /// Number of simulated robots that deviate from the model, in addition to the model itself. Default 4.
     pub robots: usize,
-    /// Delay of the robot's controller between its sensors and its drives, seconds: derived gains tolerate it, and the
-    /// robots are simulated with it. Not used for a position loop in the drives. Default 8 ms for an arm of 1.2 m (some
-    /// control cycles over a network), multiplied by the characteristic time of other arms. In a study the default is 0
-    /// if the gains are stated or the robot waits for every torque.
+    /// Delay of the robot's controller between its sensors and its drives, seconds. Derived gains tolerate this
+    /// delay, and robots are simulated with it. Not used for a position loop in the drives. Default 8 ms for an arm
+    /// of 1.2 m (some control cycles over a network), multiplied by the characteristic time of other arms. In a study
+    /// the default is 0 if the gains are given or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
-    /// Smallest inertia of a drive without described inertia, as a share of the typical one (which the effort limit
-    /// accelerates by 300 rad/s² for an arm of 1.2 m). Derived gains keep a joint stable down to it, and a robot with
-    /// such drives is simulated. Default 0.1; in a study 1 if the gains are stated, because the robot is expected to
-    /// have run with them.
+    /// Smallest inertia of a drive that the robot description does not contain, as a share of the typical inertia
+    /// (which the effort limit accelerates by 300 rad/s² for an arm of 1.2 m). Derived gains keep a joint stable down
+    /// to this inertia, and a robot with such drives is simulated. Default 0.1; in a study 1 if the gains are given,
+    /// because the robot has probably run with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lightest_drive: Option<f64>,
-    /// Number of postures at which the mass matrix is checked: as many over the workspace as along the motion. Default
-    /// 200.
+    /// Number of postures along the motion at which the mass matrix is checked; as many postures are checked in the
+    /// workspace. Default 200.
     pub postures: usize,
-    /// Seed of robots and postures. Default 1.
+    /// Seed of the random robots and postures. Default 1.
     pub seed: u64,
 }
 
@@ -78,7 +78,7 @@ impl RehearsalSettings {
         require(self.postures <= 1_000_000, "rehearsal.postures", self.postures as f64, "give at most 1000000")
     }
 
-    /// Smallest inertia of a drive without described inertia, as a share of the typical one.
+    /// Smallest inertia of a drive that the robot description does not contain, as a share of the typical inertia.
     pub fn lightest_drive(&self) -> f64 {
         self.lightest_drive.unwrap_or(LIGHTEST_DRIVE)
     }
@@ -114,9 +114,9 @@ pub enum RehearsalFailure {
         "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with this model may push in the wrong direction"
     )]
     MassMatrix {
-        /// The eigenvalue.
+        /// Smallest eigenvalue.
         eigenvalue: f64,
-        /// The positions, rad (m).
+        /// Positions of the joints, rad (m).
         q: Vec<f64>,
     },
     /// The motion needs more torque than `[iteration.envelope]` permits. Reduce the velocity or acceleration limits
@@ -133,16 +133,16 @@ pub enum RehearsalFailure {
         advice = room_words(.verdict)
     )]
     Loop {
-        /// The simulated robot.
+        /// Name of the simulated robot.
         robot: String,
-        /// How its run ended.
+        /// How its simulation ended.
         verdict: RunStatus,
     },
     /// With these gains, the simulated robot vibrates: the gains are too high for the sampling rate or the delay. Lower
     /// `kp` and `kd`, or `bandwidth_hz`.
     #[error("in simulation, {robot} oscillates: {oscillation}")]
     Oscillates {
-        /// The simulated robot.
+        /// Name of the simulated robot.
         robot: String,
         /// The oscillation.
         oscillation: JointOscillation,
@@ -151,14 +151,14 @@ pub enum RehearsalFailure {
     /// The real robot could do so, too.
     #[error("in simulation, {robot} leaves the envelope: {breach}; keep the motion further inside, or use other gains")]
     Outside {
-        /// The simulated robot.
+        /// Name of the simulated robot.
         robot: String,
         /// The violated limit.
         breach: Breach,
     },
 }
 
-/// If a motion reaches a limit exactly, no gains keep the tracking error within it.
+/// Text for a motion that reaches a limit exactly: no gains can keep the tracking error within this limit.
 fn room_words(verdict: &RunStatus) -> &'static str {
     match verdict {
         RunStatus::LimitBroken { quantity: LimitedQuantity::Position, .. } => {
@@ -175,10 +175,10 @@ fn room_words(verdict: &RunStatus) -> &'static str {
 
 #[derive(Clone, Copy)]
 struct Rehearsing {
-    /// 0 for the model, otherwise the number of the deviating robot.
+    /// 0 for the model itself, otherwise the number of the deviating robot.
     number: usize,
     delay_s: f64,
-    /// Whether its drives have the smallest inertia.
+    /// Whether the drives of the robot have the smallest inertia.
     is_light: bool,
 }
 
@@ -209,20 +209,20 @@ impl Rehearsing {
 
 pub(crate) struct Rehearsed<'a> {
     pub(crate) robot: &'a ParametricModel,
-    /// The complete commanded trajectories, including the paths from and to home.
+    /// The complete commanded trajectories, including the paths from and to the home posture.
     pub(crate) references: &'a [Cow<'a, Reference>],
     pub(crate) controller: &'a ControllerSettings,
     pub(crate) model: Option<&'a ControllerModel>,
     /// All parameters of the simulated robot, if known.
     pub(crate) believed: Option<&'a [f64]>,
-    /// The same with the smallest drive inertia; `None` if all drive inertias are known.
+    /// All parameters with the smallest drive inertia; `None` if all drive inertias are known.
     pub(crate) light: Option<&'a [f64]>,
     pub(crate) oscillation: Option<OscillationLimits>,
     pub(crate) envelope: Option<&'a Envelope>,
 }
 
 impl Rehearsed<'_> {
-    /// Rehearses until `stop` returns true.
+    /// Rehearses the motion; ends early when `stop` returns true.
     ///
     /// # Errors
     /// Invalid numbers; a failed rehearsal is part of the result.
@@ -282,8 +282,8 @@ impl Rehearsed<'_> {
                     return Ok(Err(failure));
                 }
             }
-            // Without a delay: the gains already allow for it. This detects joints that are too fast for the
-            // controller's rate.
+            // Simulated without a delay, because the gains already allow for it. This detects joints that are too
+            // fast for the controller's rate.
             if let Some(light) = self.light {
                 let one = Rehearsing { is_light: true, ..itself };
                 if let Err(failure) = self.simulate(light, one, settings, &mut random, &mut shown)? {
@@ -345,7 +345,8 @@ impl Rehearsed<'_> {
         Ok(Ok(()))
     }
 
-    /// Postures over the workspace (within the envelope, or half a turn (1 m) to either side) and along the motions.
+    /// Random postures in the workspace (within the envelope, or half a turn (1 m) to either side), and postures
+    /// along the motions.
     fn postures(&self, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
         let joints = self.robot.model().joints();
         let mut range = |joint: usize| {

@@ -3,10 +3,10 @@ use dynident_excitation::{Information, Motion};
 use dynident_simulation::Reference;
 use nalgebra::DMatrix;
 
-/// Largest number of samples at which the information of a motion is evaluated; it is an integral over time.
+/// Maximum number of samples at which the information of a motion is evaluated, as an integral over time.
 const MAX_SAMPLES: usize = 4_000;
 
-/// Smallest noise of a joint, Nm (N); simulated logs without noise have less.
+/// Smallest assumed noise of a joint, Nm (N); simulated logs without noise have less.
 const MIN_NOISE: f64 = 1e-9;
 
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub(crate) struct RunNoise {
 }
 
 impl RunNoise {
-    /// For a run of this duration (s) with this number of rows over all joints.
+    /// Creates the noise for a run of this duration (s) with this number of rows over all joints.
     pub(crate) fn new(joint_sigma: &[f64], rows: usize, duration_s: f64) -> Self {
         let joints = joint_sigma.len().max(1) as f64;
         let joint_sigma = joint_sigma.iter().map(|sigma| sigma.max(MIN_NOISE)).collect();
@@ -25,8 +25,9 @@ impl RunNoise {
     }
 }
 
-/// `Σ_j W_jᵀ W_j / σ_j²` along a trajectory, in the base columns of the robot with its terms, for the row rate of an
-/// estimate. The common low-pass of torque and columns is assumed to pass the whole motion.
+/// Information matrix `Σ_j W_jᵀ W_j / σ_j²` along a trajectory (W_j: regressor of joint j, σ_j: noise), in the base
+/// columns of the robot with its terms, at the row rate of an estimate. It is assumed that the low-pass filter of
+/// torque and columns does not change the motion.
 pub(crate) fn run_information(robot: &ParametricModel, reference: &Reference, noise: &RunNoise) -> DMatrix<f64> {
     let whole = reference.motion();
     let step = whole.samples.div_ceil(MAX_SAMPLES).max(1);

@@ -7,8 +7,8 @@ use dynident_simulation::{SimulationError, require};
 /// Safety settings of runs, in addition to the safety functions of the robot.
 #[derive(Clone, Debug, Default)]
 pub struct SafetySettings {
-    /// Whether the robot is external. A run of such a robot that was stopped early ends the iteration until the next
-    /// call, so that a person can check the robot, unless every run needs permission anyway. Default false.
+    /// Whether the robot is external. If a run of an external robot is stopped early, the iteration ends until the
+    /// next call, so that a person can check the robot; not if every run needs permission anyway. Default false.
     pub outside: bool,
     /// Limits of every sample. Default none.
     pub envelope: Option<Envelope>,
@@ -16,15 +16,16 @@ pub struct SafetySettings {
     pub oscillation: OscillationSettings,
     /// Rehearsal of every motion before it is commanded. Default none.
     pub rehearsal: Option<RehearsalSettings>,
-    /// Shares of its speed at which the motion is run before the first run, slowest first, until a run was completed;
-    /// shares of 1 are the run itself. Default none. These runs are not identified.
+    /// Shares of the full speed at which the motion is run before the first run, slowest first, until a run was
+    /// completed. A share of 1 is the run itself. Default none. Runs at reduced speed are not used for
+    /// identification.
     pub speed_steps: Vec<f64>,
-    /// Warm-up time before a run, s: the motion is repeated so that friction reaches its working temperature, before
-    /// the first run of a call and whenever the robot has been at rest for longer than this. Default 0 (no warm-up).
-    /// These passes are not identified.
+    /// Warm-up time before a run, s: the motion is repeated so that friction reaches its working temperature. This is
+    /// done before the first run of a call and whenever the robot has been at rest for longer than this time. Default
+    /// 0 (no warm-up). Warm-up motions are not used for identification.
     pub warm_up_s: f64,
-    /// Home posture between runs: every run moves from there to its motion and back. Default none: the robot has to be
-    /// at the begin of the motion.
+    /// Home posture between runs: every run moves from there to its motion and back. Default none: the robot has to
+    /// be at the beginning of the motion.
     pub home: Option<HomeSettings>,
 }
 

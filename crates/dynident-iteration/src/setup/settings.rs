@@ -17,11 +17,11 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
-    /// All joints at once.
+    /// All joints in one fit.
     #[default]
     AllJoints,
-    /// One joint at a time, from tip to base, as in the paper (Eqs. 9, 10). Each step uses the rows of one joint and
-    /// subtracts the columns that are already known.
+    /// One joint at a time, from tip to base (*Iterative Identification of Robot Dynamic Parameters Based on Logistic
+    /// Function*, Eqs. 9, 10). Each fit uses the rows of one joint and subtracts the columns that are already known.
     StepByStep,
 }
 
@@ -42,30 +42,31 @@ pub enum RunOffsets {
 pub struct RunIdentificationSettings {
     /// All joints at once (default) or joint by joint.
     pub scheme: Scheme,
-    /// How velocities and accelerations are computed from positions. Default `deviation`: exact derivatives of the
-    /// commanded motion plus derivatives of the smoothed deviation from it.
+    /// Method that computes velocities and accelerations from positions. Default `deviation`: exact derivatives of
+    /// the commanded motion, plus derivatives of the smoothed deviation from it.
     pub differentiator: DifferentiatorSettings,
-    /// Whether each run selects the differentiator with the smallest torque residual among several, including the
-    /// paper's position map ([`DifferentiatorChoice`](crate::DifferentiatorChoice)). Default false.
+    /// Whether each run selects, among several differentiators, the one with the smallest torque residual. One of
+    /// them is the map from position to velocity and acceleration along logistic functions
+    /// ([`DifferentiatorChoice`](crate::DifferentiatorChoice)). Default false.
     pub choose_differentiator: bool,
-    /// Low-pass and decimation that are applied to the torque and to every column. Default `None`.
+    /// Low-pass filter and decimation that are applied to the torque and to every regressor column. Default `None`.
     pub parallel_filter: Option<DecimationSettings>,
-    /// Whether the recorded torque is held constant from one sample to the next, as in digital drives. The torque at a
-    /// sample is then the mean of the values before and after it. Default true.
+    /// Whether the recorded torque is held constant from one sample to the next, as in digital drives. The torque at
+    /// a sample is then the mean of the values before and after it. Default true.
     pub held_torque: bool,
-    /// Whether rows near rest are excluded where the dry friction model of a joint does not fit there
+    /// Whether rows near rest (zero velocity) are excluded for joints whose dry friction model does not fit there
     /// ([`SamplesNearRest`](crate::SamplesNearRest)). Default true. Rows at rest are always excluded.
     pub set_aside_near_rest: bool,
-    /// Estimator, excitation thresholds and sources of error bars. Default weighted least squares. The joint-by-joint
-    /// scheme supports ordinary and weighted least squares.
+    /// Estimator, excitation thresholds and sources of error bars. Default weighted least squares. If joints are
+    /// identified one at a time, only ordinary and weighted least squares are supported.
     pub estimation: EstimationSettings,
-    /// Source of the joints' friction; the terms of the robot by default. The first run that allows a selection makes
-    /// it, and later runs use the same terms.
+    /// Source of the joints' friction laws; the terms of the robot by default. If friction is selected, the first run
+    /// with sufficient data selects it, and later runs use the same terms.
     pub friction: FrictionSource,
-    /// Prior knowledge of the bodies for the physically consistent model of the controllers; `None` gives the
-    /// controllers the unconstrained estimate.
+    /// Prior knowledge of the bodies for the physically consistent model of the controllers; with `None` the
+    /// controllers get the unconstrained estimate.
     pub consistency: Option<ConsistencySettings>,
-    /// Payloads of the legs. Default empty.
+    /// Payloads that the robot carries in the trajectories. Default empty.
     pub payloads: Vec<Payload>,
     /// Whether runs that are fitted together share the constant torque offsets of their joints.
     pub run_offsets: RunOffsets,
@@ -112,40 +113,41 @@ pub enum StartWith {
     Prior,
 }
 
-/// When an iteration has converged; [`UnmetCondition`](crate::UnmetCondition) lists the conditions. Parameters have
-/// converged if `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and
-/// `s ≤ most_uncertain · max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare
-/// parameters of different units, each is weighted by its torque along the motion as a share of the joint torque.
+/// Conditions for convergence; [`UnmetCondition`](crate::UnmetCondition) lists them all. Parameters have converged if
+/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain ·
+/// max|θ|`, where θ_k is the estimate after run k and s its standard deviation. To compare parameters of different
+/// units, each parameter is multiplied by its torque along the motion as a share of the joint torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ConvergenceSettings {
-    /// Largest change of a parameter by the last run, in error bars of the parameter, for a converged iteration.
-    /// Default 3.
+    /// Largest change of a parameter by the last run, in error bars of the parameter, with which an iteration has
+    /// converged. Default 3.
     pub parameter_sigmas: f64,
-    /// Change of a parameter that is accepted in addition, as a share of the largest parameter, both measured by their
-    /// torque. Default 1e-6.
+    /// Additional accepted change of a parameter, as a share of the largest parameter, both measured by their torque.
+    /// Default 1e-6.
     pub parameter_tolerance: f64,
-    /// Largest error bar (one standard deviation) of a parameter as a share of the largest parameter, both measured by
-    /// their torque, for a converged iteration. Default 0.1.
+    /// Largest error bar (one standard deviation) of a parameter with which an iteration has converged, as a share of
+    /// the largest parameter, both measured by their torque. Default 0.1.
     pub most_uncertain: f64,
     /// Accepted tracking error, rad (m): the largest deviation of each joint from its trajectory. Default 1e-4.
     pub tracking_tolerance: f64,
-    /// Smallest factor by which the tracking error of consecutive runs must fall; below it the iteration ends,
-    /// converged or not. Default 1.5.
+    /// Smallest factor by which the tracking error must decrease between consecutive runs; below it the iteration
+    /// ends, converged or not. Default 1.5.
     pub tracking_ratio: f64,
-    /// Factor on the tracking floor (from noise, friction and delay) up to which a tracking error is accepted. Default
-    /// 2.
+    /// Accepted ratio of the tracking error to the tracking floor, the error that noise, friction and delay explain.
+    /// Default 2.
     pub floor_ratio: f64,
-    /// Largest unexplained torque of a joint beyond the noise of the log, in percent of the joint torque (root mean
-    /// squares). Default 5.
+    /// Largest accepted unexplained torque of a joint beyond the noise of the log, in percent of the joint torque
+    /// (root mean squares). Default 5.
     pub most_unexplained_percent: f64,
-    /// Longest compensated lag between torque and motion for a converged iteration, seconds. With a longer lag the
-    /// logged position differs from the true position of the robot. Default 10 ms, for an arm longer than 1.2 m
-    /// multiplied by its characteristic time; bus delay does not shrink with the arm.
+    /// Longest compensated lag between torque and motion with which an iteration has converged, seconds. With a
+    /// longer lag the logged position differs from the true position of the robot. Default 10 ms; for an arm longer
+    /// than 1.2 m multiplied by its characteristic time. For smaller arms it stays at 10 ms, because the delay of a
+    /// bus does not depend on the arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_lag_s: Option<f64>,
-    /// Thresholds of the verdict on a run. Not part of study files.
+    /// Thresholds for accepting a run. Not part of study files.
     #[serde(skip)]
     pub verdict: VerdictSettings,
 }
@@ -187,18 +189,21 @@ pub struct IterationSettings {
     pub first: Option<ControllerSettings>,
     /// Model of the first run's controller (all parameters). Default the nominal model.
     pub first_model: Option<Vec<f64>>,
-    /// Controller without a model, also used as a fallback after a bad model. Default joint PD (16 and 8).
+    /// Controller without a model; also used as a fallback after a bad model. Default joint PD with the gains 16 and
+    /// 8.
     pub model_free: ControllerSettings,
-    /// Controller with the estimated model. Default the paper's finite-time law with its gains of joint 2 (4 and 4).
+    /// Controller with the estimated model. Default the finite-time controller with the gains 4 and 4.
     pub controller: ControllerSettings,
-    /// Whether a run that got worse is rejected and its step halved. Default true.
+    /// Whether a run that is worse than the previous one is rejected and the change of the parameters halved. Default
+    /// true.
     pub reject: bool,
     /// Whether the model is fitted to all good runs together (default), or only to the newest run.
     pub pool: bool,
-    /// A run is worse if its tracking error (mean of the joint maxima) exceeds this factor times that of the last good
-    /// run, and `settled.tracking_tolerance`. Default 1.5.
+    /// A run is worse if its tracking error (mean of the joint maxima) exceeds `settled.tracking_tolerance` and this
+    /// factor times the error of the last good run. Default 1.5.
     pub worse_factor: f64,
-    /// Number of step halvings before the iteration falls back to the controller without a model. Default 3.
+    /// Number of halvings of the parameter change before the iteration falls back to the controller without a model.
+    /// Default 3.
     pub most_halvings: usize,
     /// Factor on the gains of the controller without a model each time the iteration falls back to it. Default 2.
     pub stiffen: f64,
@@ -206,9 +211,9 @@ pub struct IterationSettings {
     pub most_model_free: usize,
     /// Largest number of runs. Default 8.
     pub max_runs: usize,
-    /// When the iteration has converged.
+    /// Conditions for convergence.
     pub settled: ConvergenceSettings,
-    /// When a difference between logged and commanded torque is reported; `None` disables the check.
+    /// Thresholds for reporting a difference between logged and commanded torque; `None` disables the check.
     pub torque_check: Option<TorqueCheckSettings>,
     /// Safety of the runs.
     pub safety: SafetySettings,
@@ -238,8 +243,10 @@ impl Default for IterationSettings {
 }
 
 impl IterationSettings {
-    /// The paper's scheme: velocities and accelerations by the map from position (Eqs. 15, 16) with an estimated lag of
-    /// at most `max_lag_s` (seconds), joint by joint, each estimate directly used by the controller, no run rejected.
+    /// The scheme of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*: velocities
+    /// and accelerations follow from position by Eqs. 15 and 16, with an estimated lag of at most `max_lag_s`
+    /// (seconds). Joints are identified one by one, each estimate is directly used by the controller, and no run is
+    /// rejected.
     pub fn literal(max_lag_s: f64) -> Self {
         Self {
             identification: RunIdentificationSettings {

@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum IterationStatus {
-    /// All conditions are met: no [`UnmetCondition`](crate::UnmetCondition) is left.
+    /// All conditions are met: [`UnmetCondition`](crate::UnmetCondition) lists none.
     Converged,
     /// Tracking and parameters no longer change, but a condition is not met: a further run of the same motion would not
     /// help.
     Settled,
     /// The largest number of runs was reached.
     RunsUsedUp,
-    /// No run is possible with any of the controllers.
+    /// No controller permits a further run.
     Refused {
         /// Why.
         reason: String,

@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct TorqueCheckSettings {
-    /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
-    /// have at most 1.5.
+    /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the robots in the
+    /// tests deviate by at most 1.5.
     pub scale_percent: f64,
     /// Largest root mean square of the difference between logged and commanded torque, in percent of the joint's
-    /// torque. Default 5: correct logs of the campaign's robots have at most 2.
+    /// torque. Default 5: correct logs of the robots in the tests have at most 2.
     pub difference_percent: f64,
-    /// Largest deviation of a joint's torque scale from that of the other joints (from the parameters that their rows
-    /// share), percent. Default 5.
+    /// Largest deviation of a joint's torque scale from that of the other joints, percent; it follows from the
+    /// parameters on which the torques of several joints depend. Default 5.
     pub row_scale_percent: f64,
     /// Largest deviation of the log's clock from the controller's, percent. Default 0.1.
     pub clock_percent: f64,
-    /// Smallest significant deviation in standard deviations, in addition to its size. Default 4.
+    /// Number of standard deviations that a deviation must also exceed. Default 4.
     pub sigmas: f64,
-    /// When a cause of a difference is reported. Not part of study files.
+    /// Thresholds for reporting the cause of a difference. Not part of study files.
     #[serde(skip)]
     pub causes: CauseSettings,
 }
@@ -27,13 +27,13 @@ pub struct TorqueCheckSettings {
 /// Thresholds for the cause of a difference between logged and commanded torque.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CauseSettings {
-    /// Smallest share of the squared difference that a cause of all joints explains, 0 to 1. Default 0.85.
+    /// Minimum share of the squared difference that a cause common to all joints must explain, 0 to 1. Default 0.85.
     pub min_explained_share: f64,
-    /// Smallest ratio of the squared residuals of the second-best and the best cause of all joints. Default 2.
+    /// Minimum ratio of the squared residuals of the second-best and the best common cause. Default 2.
     pub min_residual_ratio: f64,
-    /// Smallest explained share for a cause of a single joint, 0 to 1. Default 0.95.
+    /// Minimum share that the cause for a single joint must explain, 0 to 1. Default 0.95.
     pub min_explained_share_alone: f64,
-    /// Smallest ratio of the squared residuals of any other and the best cause of a single joint. Default 4.
+    /// Minimum ratio of the squared residuals of any other and the best cause for a single joint. Default 4.
     pub min_residual_ratio_alone: f64,
 }
 

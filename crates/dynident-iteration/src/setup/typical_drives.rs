@@ -1,33 +1,35 @@
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{JointProperty, TermAction};
 
-/// Acceleration of a drive's own inertia at full effort, rad/s² (m/s²) for an arm of 1.2 m.
+/// Acceleration of a drive's own inertia at its effort limit, rad/s² (m/s²) for an arm of 1.2 m.
 const DRIVE_ACCELERATION: f64 = 300.0;
-/// Ratio of the typical to the smallest inertia of a drive: geared arms have up to 500 rad/s².
+/// Ratio of the typical to the smallest inertia of a drive: in geared arms the effort limit accelerates the drive
+/// inertia by at most 500 rad/s².
 pub(crate) const TIMES_THE_LIGHTEST: f64 = 500.0 / DRIVE_ACCELERATION;
 /// Dry friction, and viscous friction at full velocity, as shares of the effort limit.
 pub(crate) const FRICTION: f64 = 0.05;
-/// Velocity of a joint without velocity limit, rad/s (m/s) for an arm of 1.2 m.
+/// Assumed velocity limit of a joint that has none, rad/s (m/s) for an arm of 1.2 m.
 const SPEED: f64 = 2.0;
 
 /// Returns the nominal parameters with typical values for the drive terms that are zero in the robot description;
 /// `None` if no value was replaced.
 /// * Drive inertia: the effort limit accelerates it by 300 rad/s² (m/s²) on an arm of 1.2 m; on other robots by this
-///   value in [characteristic units](dynident_model::CharacteristicScale). Geared arms have 100 to 500 rad/s²; a UR10's
-///   wrist has 0.2 kg m² at 56 Nm.
+/// value in [characteristic units](dynident_model::CharacteristicScale). The accelerations of geared arms are 100 to
+/// 500 rad/s²; a UR10's wrist has 0.2 kg m² at 56 Nm.
 /// * Dry friction: 5 % of the effort limit.
 /// * Viscous friction: 5 % of the effort limit at the velocity limit.
 pub fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |_| true, 1.0)
 }
 
-/// The same with this share of the typical inertia at drives without described inertia.
+/// Like [`with_typical_drives`], with this share of the typical inertia for drives whose inertia is not in the
+/// description.
 pub(crate) fn with_light_drives(robot: &ParametricModel, share: f64) -> Option<Vec<f64>> {
     with_typical_inertia(robot).and_then(|_| filled_in(robot, |_| true, share))
 }
 
-/// The same with inertia only, for the model of a controller before the first estimate: a controller would
-/// overcompensate friction that does not exist.
+/// Like [`with_typical_drives`], with inertia only, for the model of a controller before the first estimate: with
+/// typical friction, the controller could compensate friction that does not exist.
 pub(crate) fn with_typical_inertia(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |property| property == JointProperty::DriveInertia, 1.0)
 }

@@ -1,29 +1,30 @@
 use dynident_simulation::{SimulationError, require};
 
-/// Thresholds of the verdict on a run and on its estimate. They are not part of study files.
+/// Thresholds for accepting a run and its estimate. They are not part of study files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VerdictSettings {
-    /// Largest share of a joint's samples at the drive's limit, 0 to 1. Default 0.002: a limit that is touched briefly
-    /// at a reversal has no effect.
+    /// Largest share of a joint's samples at the drive's torque limit, 0 to 1. Default 0.002: a limit that is reached
+    /// briefly at a reversal has no effect.
     pub max_clipped_share: f64,
-    /// Smallest share of the torque inside the 95 % band of a prediction, 0 to 1. Default 0.85: residuals that are
-    /// correlated over seconds let the share vary by some percent; a prediction that is off by its noise throughout has
-    /// 0.83.
+    /// Smallest share of the torque inside the 95 % band of a prediction, 0 to 1. Default 0.85. Residuals that are
+    /// correlated over seconds change the share by some percent; if the error of a prediction is everywhere as large
+    /// as the noise, the share is 0.83.
     pub min_inside_share: f64,
-    /// Ratio of the lag difference of two runs to its 95 % interval above which the lags differ. Default 1.5: with six
-    /// joints and some runs, ratios above 1 occur by chance.
+    /// The lags of two runs differ if the ratio of their difference to its 95 % interval exceeds this. Default 1.5:
+    /// with six joints and some runs, ratios above 1 occur by chance.
     pub min_lag_change_ratio: f64,
-    /// Largest ratio of a good run's error bars to those of an earlier estimate for which the new estimate is used.
-    /// Default 3.
+    /// Largest ratio of the error bars of a good run to those of an earlier estimate with which the new estimate is
+    /// used. Default 3.
     pub max_width_ratio_of_good_run: f64,
-    /// Largest ratio of a rejected run's error bars to those of a good run for which its estimate is used. Default 0.5.
+    /// Largest ratio of the error bars of a rejected run to those of a good run with which its estimate is used.
+    /// Default 0.5.
     pub max_width_ratio_of_rejected_run: f64,
-    /// Share of a joint's samples at the drive's limit above which a run that left its trajectory proves that no
-    /// controller can follow it, 0 to 1. Default 0.05.
+    /// If a run left its trajectory and more than this share of a joint's samples is at the drive's torque limit, no
+    /// controller can follow the trajectory; 0 to 1. Default 0.05.
     pub min_saturated_share: f64,
-    /// Bounds of the largest tracking error with which a joint follows its trajectory, rad (m): half of the joint's
-    /// range of motion, within these bounds. Default 0.1 and 1: beyond them other effects may occur than along the
-    /// motion (end stops, other contacts, friction at other speeds).
+    /// Bounds of the tracking error up to which a joint follows its trajectory, rad (m): half of the joint's range of
+    /// motion, within these bounds. Default 0.1 and 1. Farther from the trajectory other effects can occur (end
+    /// stops, other contacts, friction at other velocities).
     pub following_error_bounds: [f64; 2],
     /// Detection of a link length that differs from the robot description.
     pub lengths: LengthSettings,
@@ -76,15 +77,16 @@ impl VerdictSettings {
 /// Thresholds of the detection of a link length that differs from the robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LengthSettings {
-    /// Smallest relative change that is reported. Default 0.01: bearings and dimension tables are not more accurate.
+    /// Smallest relative change that is reported. Default 0.01: bearings and tables of dimensions are not more
+    /// accurate.
     pub min_change: f64,
-    /// Largest ratio of a joint's residual with the other length to that with the described length. Default 0.8:
-    /// unmodelled friction is not mistaken for a length, because residuals vary by some tenths of a percent per fitted
-    /// parameter by chance.
+    /// Largest ratio of a joint's residual with the other length to the residual with the length in the description.
+    /// Default 0.8, so that unmodelled friction is not mistaken for a length. By chance, residuals decrease by some
+    /// tenths of a percent per fitted parameter.
     pub max_residual_ratio: f64,
-    /// Smallest share of the squared residuals of all joints that another length explains, 0 to 1. Default 0.12: a
-    /// length affects several joints, whereas unmodelled friction in one light joint is explained by a length in that
-    /// joint only. A correct arm of the test campaign reaches 0.06.
+    /// Smallest share of the squared residuals of all joints that another length must explain, 0 to 1. Default 0.12.
+    /// A wrong length affects several joints, whereas a length that compensates unmodelled friction of one light
+    /// joint improves only this joint. A correct arm in the tests reaches 0.06.
     pub min_explained_share: f64,
 }
 

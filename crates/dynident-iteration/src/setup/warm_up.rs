@@ -8,32 +8,32 @@ use dynident_simulation::{Record, Reference};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Result of a warm-up: passes along the run's motion, which are not fitted.
+/// Result of a warm-up: repetitions (passes) of the run's motion, which are not used for a fit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WarmUp {
     /// Number of passes.
     pub passes: usize,
-    /// Length of all passes, including the paths from and to home, s.
+    /// Duration of all passes, including the paths from and to the home posture, s.
     pub duration_s: f64,
-    /// Mean power loss of all joints in each pass, W: `Σ ∫τ q̇ dt` over the time. For a motion that returns to its
-    /// begin this is the power of friction, for any bodies.
+    /// Mean power loss of all joints in each pass, W: the integral `Σ ∫τ q̇ dt` divided by the time. For a motion
+    /// that ends where it begins, this is the power of friction, for any bodies.
     pub lost_power_w: Vec<f64>,
-    /// Mean torque in the direction of motion for each pass and joint, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. It contains the
-    /// coupling between joints, which is the same in every pass, so its change is that of friction. Zero for a joint at
-    /// rest.
+    /// Mean torque in the direction of motion for each pass and joint, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. It includes the
+    /// coupling between joints, which is the same in every pass, so its change is the change of friction. Zero for a
+    /// joint at rest.
     pub friction_torque: Vec<Vec<f64>>,
 }
 
 impl WarmUp {
-    /// Returns the increase of the power loss from the first to the last pass, percent of the first; `None` for a
+    /// Returns the increase of the power loss from the first to the last pass, in percent of the first; `None` for a
     /// single pass.
     pub fn change_percent(&self) -> Option<f64> {
         let [first, .., last] = self.lost_power_w[..] else { return None };
         (first != 0.0).then(|| 100.0 * (last - first) / first.abs())
     }
 
-    /// Returns the increase from the second-last to the last pass, percent.
+    /// Returns the increase of the power loss from the second-last to the last pass, percent.
     pub fn last_change_percent(&self) -> Option<f64> {
         let [.., before, last] = self.lost_power_w[..] else { return None };
         (before != 0.0).then(|| 100.0 * (last - before) / before.abs())
@@ -69,8 +69,8 @@ impl WarmUp {
     }
 }
 
-/// Number of passes before the next run: none if the robot has moved within the warm-up time, otherwise enough to fill
-/// that time.
+/// Number of passes before the next run: zero if the robot has moved within the warm-up time, otherwise as many as
+/// fill that time.
 pub(crate) fn passes(
     safety: &SafetySettings,
     legs: &[Leg],
@@ -108,8 +108,9 @@ impl WarmUpWatch {
         Self { pass_s: pass_s(legs, ways), passes: Vec::new() }
     }
 
-    /// Adds the record of a leg in a pass (counted from 1). A torque that is held from sample to sample does the work
-    /// `τ Δq`, whatever the joint does in between; the path length is that of the reference, which has no noise.
+    /// Adds the record of one trajectory in a pass (counted from 1). A torque that is held from sample to sample does
+    /// the work `τ Δq`, independent of the motion between samples. The path length is that of the reference, which
+    /// has no noise.
     pub(crate) fn add(&mut self, pass: usize, reference: &Reference, record: &Record) {
         let joints = record.joints.len();
         while self.passes.len() < pass {

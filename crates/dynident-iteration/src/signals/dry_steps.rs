@@ -1,12 +1,13 @@
-//! Friction with a step at rest that is too narrow to be identified: simulated as dry friction.
+//! Friction whose smoothed sign function is too narrow to be identified: it is simulated as dry friction.
 
 use crate::signals::rests::MOVING;
 use dynident_identification::friction::JointFriction;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 
-/// Replaces narrow friction steps by dry friction with stiction, for a simulation along a motion with these highest
-/// speeds. A step is narrow if its width is below the speed at which a joint is at rest: runs do not determine the
-/// width, dry friction holds a joint at rest, and it needs no short integration steps.
+/// Replaces narrow smoothed sign functions of friction by dry friction with stiction, for a simulation along a motion
+/// with these highest velocities. A function is narrow if its width is below the velocity at which a joint is treated
+/// as at rest. Runs do not determine such a width. Dry friction holds a joint at rest and needs no short integration
+/// steps.
 pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<TorqueTerm> {
     let dry = |term: &TorqueTerm| {
         let fastest = term.joints().into_iter().map(|joint| fastest[joint]).fold(0.0, f64::max);
@@ -18,10 +19,10 @@ pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<Torqu
     terms.iter().map(dry).collect()
 }
 
-/// The terms and parameters with sticking joints: joints whose narrowest step may be dry friction, by its width or by
-/// the 95 % interval of the width that runs `chose` for the joint of this name. All friction terms of such a joint
-/// become dry, because their separate widths are not reliable when smoothing hides the step. `None` if this adds no
-/// joint to those of [`with_dry_steps`].
+/// The terms and parameters with joints that can stick: joints whose narrowest sign function may be dry friction, by
+/// its width or by the 95 % interval of the width that the runs selected (`chose`) for the joint with this name. All
+/// friction terms of such a joint become dry, because their separate widths are not reliable if smoothing of the
+/// motion hides the transition. `None` if no joint is added to those of [`with_dry_steps`].
 pub(crate) fn with_sticking_joints(
     terms: &[TorqueTerm],
     parameters: &[f64],

@@ -1,24 +1,24 @@
 use crate::signals::rests::StictionBand;
 use serde::{Deserialize, Serialize};
 
-/// A joint whose rows near rest are excluded from a run, and its residual there.
+/// A joint whose rows near rest (zero velocity) are excluded from a run, and its residual there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SamplesNearRest {
-    /// Distance from rest above which its rows are used.
+    /// Distance from rest above which the joint's rows are used.
     pub margin: StictionBand,
-    /// Share of the joint's samples that is excluded in addition to those at rest.
+    /// Share of the joint's samples that is excluded, in addition to samples at rest.
     pub share: f64,
     /// Approximate root mean square of the residual near rest in a fit to all rows, Nm (N).
     pub residual_nm: f64,
-    /// Estimated dry friction with the root mean square of the joint's torque as its load, Nm (N): the largest
-    /// stiction.
+    /// Estimated dry friction, Nm (N): the largest stiction. Load-dependent friction is evaluated at the root mean
+    /// square of the joint's torque.
     pub dry_friction_nm: f64,
 }
 
 impl SamplesNearRest {
-    /// Standard deviation of the residual of all rows of a joint, Nm (N), if the residual near rest is larger than its
-    /// dry friction; `sigma` is that of the rows in use.
+    /// Standard deviation of the residual of all rows of a joint, Nm (N), if the residual near rest is larger than
+    /// its dry friction. `sigma` is the standard deviation over the rows that are used.
     pub(crate) fn unexplained_nm(&self, sigma: f64) -> Option<f64> {
         let all = (1.0 - self.share) * sigma * sigma + self.share * self.residual_nm * self.residual_nm;
         (self.residual_nm > self.dry_friction_nm).then(|| all.sqrt())

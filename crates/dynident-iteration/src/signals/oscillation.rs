@@ -1,37 +1,38 @@
-//! Detection of oscillations of a joint: a signal that alternates far faster than any motion, as from a control loop
-//! that is too fast for its delay or a drive that switches between two torques.
+//! Detection of oscillations of a joint: a signal that alternates far faster than any motion. Causes are, for
+//! example, a control loop that is too fast for its delay, or a drive that switches between two torques.
 //!
-//! The signal without its moving mean over one period of the lowest frequency alternates when it passes `+h` and `-h`
-//! in turn. Oscillations are regular: over [`SWINGS`] alternations the period lengths differ little. The periods of
-//! noise vary by as much as their length.
+//! The moving mean over one period of the lowest frequency is subtracted. The signal then alternates if it passes the
+//! thresholds `+h` and `-h` in turn. Oscillations are regular: over [`SWINGS`] alternations the lengths of periods
+//! differ little. For noise, the lengths of periods vary by as much as their mean.
 
 use dynident_model::Model;
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Default lowest frequency of an oscillation, Hz, for an arm of 1.2 m: motions have up to about 2 Hz, loops with some
-/// milliseconds of delay become unstable at 20 to 60 Hz.
+/// Default of the lowest frequency of an oscillation, Hz, for an arm of 1.2 m: motions have frequencies up to about 2
+/// Hz, and loops with some milliseconds of delay become unstable at 20 to 60 Hz.
 const LOWEST_HZ: f64 = 8.0;
 /// Number of consecutive alternations of an oscillation: eight periods.
 pub(crate) const SWINGS: usize = 16;
-/// Largest relative standard deviation of the periods (noise has 0.4 to 0.7). Rounding adds half a sample, for periods
-/// of at least `MIN_ROUNDED_PERIOD` samples.
+/// Largest relative standard deviation of the periods of an oscillation (noise has 0.4 to 0.7). Rounding adds half a
+/// sample, for periods of at least `MIN_ROUNDED_PERIOD` samples.
 const MAX_PERIOD_VARIATION: f64 = 0.12;
 const ROUNDING_SAMPLES: f64 = 0.5;
 const MIN_ROUNDED_PERIOD: f64 = 5.0;
-/// Largest standard deviation of the logarithm of the ratio of consecutive peaks for which a run is stopped. Noise has
-/// 0.4, a sine of five samples per period at most 0.2.
+/// A run is stopped if the standard deviation of the logarithm of the ratio of consecutive peaks is at most this.
+/// Noise has 0.4, a sine of five samples per period at most 0.2.
 const MAX_PEAK_VARIATION: f64 = 0.25;
-/// Threshold over the root mean square of the signal: a sine reaches 1.4; two thirds of noise samples are below 1.
+/// Ratio of the threshold to the root mean square of the signal. The peaks of a sine have a ratio of 1.4; two thirds
+/// of noise samples are below 1.
 const THRESHOLD_RMS_RATIO: f64 = 0.8;
 /// Irregular alternations are an oscillation if they exceed this number of standard deviations of the noise.
 const MIN_NOISE_SIGMAS: f64 = 6.0;
-/// An oscillation whose last peaks are below this share of its first ones decays.
+/// An oscillation decays if its last peaks are below this share of its first peaks.
 const MIN_SUSTAINED_SHARE: f64 = 0.8;
 
-/// Alternations at the end of a stopped run that are an oscillation, their threshold as a share of the largest value,
-/// and the smallest ratio of consecutive peaks.
+/// Number of alternations at the end of a stopped run that are an oscillation, their threshold as a share of the
+/// largest value, and the smallest ratio of consecutive peaks.
 const MIN_LAST_SWINGS: usize = 5;
 const LAST_SWINGS_THRESHOLD_SHARE: f64 = 0.005;
 const MIN_PEAK_GROWTH: f64 = 0.9;
@@ -41,15 +42,16 @@ const MIN_PEAK_GROWTH: f64 = 0.9;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct OscillationSettings {
-    /// Lowest frequency of an oscillation, Hz; slower ones are part of the motion. Default 8 Hz for an arm of 1.2 m,
-    /// divided by the characteristic time of other arms.
+    /// Lowest frequency of an oscillation, Hz; slower signals are part of the motion. Default 8 Hz for an arm of 1.2
+    /// m, divided by the characteristic time of other arms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_hz: Option<f64>,
-    /// Amplitude of the velocity error of a joint at which a run is stopped, in percent of the joint's highest velocity
-    /// in the motion, over eight consecutive periods that do not decay. Default 10; 0 disables the stop.
+    /// Amplitude of a joint's velocity error at which a run is stopped, in percent of the joint's highest velocity in
+    /// the motion. The oscillation must last eight consecutive periods without decaying. Default 10; 0 disables the
+    /// stop.
     pub speed_percent: f64,
-    /// Amplitude of a torque oscillation that is reported, in percent of the joint torque (root mean square). Default
-    /// 10.
+    /// Smallest amplitude of a torque oscillation that is reported, in percent of the joint torque (root mean
+    /// square). Default 10.
     pub torque_percent: f64,
     /// Smallest percentage of oscillating samples that is reported. Default 2.
     pub time_percent: f64,
@@ -94,7 +96,7 @@ impl OscillationSettings {
 /// Limits of a run; it is stopped if a joint oscillates beyond them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OscillationLimits {
-    /// Lowest frequency, Hz.
+    /// Lowest frequency of an oscillation, Hz.
     pub lowest_hz: f64,
     /// Smallest amplitude of the velocity error, as a share of the joint's highest velocity in the trajectory.
     pub speed_share: f64,
@@ -118,7 +120,7 @@ pub(crate) struct Search {
     /// Smallest amplitude, in the unit of the signal.
     pub(crate) least: f64,
     pub(crate) least_share: f64,
-    /// Standard deviation of the signal's noise; 0 if unknown, then only regular oscillations are detected.
+    /// Standard deviation of the signal's noise; 0 if unknown. In that case only regular oscillations are detected.
     pub(crate) noise: f64,
 }
 
@@ -132,7 +134,7 @@ pub(crate) fn oscillation(values: &[f64], rate_hz: f64, search: Search) -> Optio
         .flatten();
     let is_seen = |(samples, ..): &(usize, usize, f64)| *samples as f64 >= search.least_share * values.len() as f64;
     let found = regular.into_iter().chain(beyond).filter(is_seen);
-    // Prefer the regular oscillation, unless the irregular one has more than twice the samples.
+    // The regular oscillation is preferred, unless the irregular one has more than twice as many samples.
     let (samples, alternations, peaks) = found.reduce(|one, other| if other.0 > 2 * one.0 { other } else { one })?;
     Some(Oscillation {
         frequency_hz: 0.5 * alternations as f64 * rate_hz / samples as f64,
@@ -141,12 +143,13 @@ pub(crate) fn oscillation(values: &[f64], rate_hz: f64, search: Search) -> Optio
     })
 }
 
-/// Detects an oscillation that grows up to the end of the signal, as in a stopped run. Fewer alternations are enough,
-/// because the run did exceed a limit. Its amplitude is that of the last period.
+/// Detects an oscillation that grows up to the end of the signal, as in a stopped run. Fewer alternations are
+/// sufficient, because the run exceeded a limit. The amplitude is that of the last period.
 pub(crate) fn growing_oscillation(values: &[f64], rate_hz: f64, lowest_hz: f64) -> Option<Oscillation> {
     let half_period = half_period(rate_hz, lowest_hz)?;
     let last_values = &values[values.len().saturating_sub(SWINGS * half_period)..];
-    // Use differences: about the mean over the last alternations, the first and far smaller ones would not alternate.
+    // Differences are used: relative to the mean over the last alternations, the first and far smaller alternations
+    // would not be counted.
     let swinging: Vec<f64> = last_values.windows(2).map(|two| two[1] - two[0]).collect();
     let peak = swinging.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut counter = AlternationCounter::new(LAST_SWINGS_THRESHOLD_SHARE * peak, half_period);
@@ -172,13 +175,13 @@ pub(crate) fn growing_oscillation(values: &[f64], rate_hz: f64, lowest_hz: f64) 
     })
 }
 
-/// Longest half period, samples; `None` for rates that are too low for the lowest frequency.
+/// Longest half period, samples; `None` if the sampling rate is too low for the lowest frequency.
 fn half_period(rate_hz: f64, lowest_hz: f64) -> Option<usize> {
     let samples = 0.5 * rate_hz / lowest_hz;
     (samples.is_finite() && samples >= 1.0).then_some(samples.ceil() as usize)
 }
 
-/// Number of samples of oscillations that `is_one` accepts, of alternations in them, and the sum of their peaks.
+/// Number of samples of the oscillations that `is_one` accepts, number of their alternations, and sum of their peaks.
 fn swings(
     swinging: &[f64],
     threshold: f64,
@@ -203,7 +206,7 @@ fn swings(
 
 #[derive(Clone, Copy, Debug)]
 struct Alternation {
-    /// The sample at which the threshold of the other side is passed.
+    /// The sample at which the signal passes the opposite threshold.
     sample: usize,
     length: usize,
     peak: f64,
@@ -215,9 +218,10 @@ struct AlternationCounter {
     threshold: f64,
     longest: usize,
     sample: usize,
-    /// The current side (positive or not), the sample at which it was entered, and the largest magnitude since.
+    /// The side on which the signal is (positive or not), the sample at which it got there, and the largest magnitude
+    /// since.
     side: Option<(bool, usize, f64)>,
-    /// The newest alternations that follow each other within half a period of the lowest frequency.
+    /// The newest alternations; each follows the previous one within half a period of the lowest frequency.
     last: VecDeque<Alternation>,
 }
 
@@ -304,7 +308,7 @@ impl OscillationWatch {
         Some(Self { counter, rate_hz, window, sum: 0.0, squares: VecDeque::new() })
     }
 
-    /// Adds a deviation; returns an oscillation if it completes one that does not decay.
+    /// Adds a deviation from the trajectory; returns an oscillation if this sample completes one that does not decay.
     pub(crate) fn add(&mut self, deviation: f64) -> Option<Oscillation> {
         let length = 2 * self.counter.longest + 1;
         self.window.push_back(deviation);
@@ -315,7 +319,7 @@ impl OscillationWatch {
         if self.window.len() < length {
             return None;
         }
-        // The sample in the middle of the window, half a period late.
+        // The sample in the middle of the window; the result is half a period late.
         let x = self.window[length / 2] - self.sum / length as f64;
         self.squares.push_back(x * x);
         if self.squares.len() > SWINGS * self.counter.longest {
@@ -327,7 +331,7 @@ impl OscillationWatch {
         }
         let last = &self.counter.last;
         let samples: usize = last.iter().map(|one| one.length).sum();
-        // Noise exceeds the threshold only now and then.
+        // Noise exceeds the threshold only occasionally.
         let own = self.squares.iter().rev().take(samples);
         let rms = (own.sum::<f64>() / samples as f64).sqrt();
         let mean = |peaks: &mut dyn Iterator<Item = f64>| peaks.sum::<f64>() / (SWINGS / 4) as f64;

@@ -1,4 +1,5 @@
-//! Samples at which a joint is at rest or near rest. Its static friction there does not follow from its velocity.
+//! Samples at which a joint is at rest or near rest (zero velocity). Its static friction there does not follow from
+//! its velocity.
 
 use core::ops::Range;
 use dynident_dynamics::ParametricModel;
@@ -7,26 +8,27 @@ use dynident_model::terms::TermAction;
 use dynident_simulation::Reference;
 use serde::{Deserialize, Serialize};
 
-/// Share of a joint's highest speed below which it is at rest.
+/// Share of a joint's highest velocity below which the joint is at rest.
 pub(crate) const MOVING: f64 = 0.02;
 
 /// Distance from rest above which the torque of a joint is used.
 ///
 /// A joint with dry friction sticks, breaks loose and jumps, but its smoothed velocity does not. The resulting error
-/// lasts as long as the smoothing window. So samples at which the joint is slower than `speed_share` of its highest
-/// speed are excluded, and `smoothing_periods` periods of the smoother's cut-off before and after them.
+/// lasts as long as the smoothing window. Therefore samples are excluded at which the joint is slower than
+/// `speed_share` of its highest velocity, and also `smoothing_periods` periods of the smoother's cut-off frequency
+/// before and after them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StictionBand {
     /// Share of the joint's highest speed in the run.
     pub speed_share: f64,
-    /// Periods of the smoother's cut-off on either side.
+    /// Number of periods of the smoother's cut-off frequency on either side.
     pub smoothing_periods: f64,
 }
 
 impl StictionBand {
-    /// Samples at rest only: slower than 2 % of the highest speed, plus half a smoothing period around rests that last
-    /// longer than one period.
+    /// Only samples at rest: slower than 2 % of the highest velocity, plus half a smoothing period around rests that
+    /// last longer than one period.
     pub const REST: Self = Self { speed_share: MOVING, smoothing_periods: 0.0 };
 
     /// Ranges of samples within this margin, for a joint with velocities `dq` and a smoother with a period of
@@ -54,7 +56,8 @@ impl Default for StictionBand {
     }
 }
 
-/// Whether each joint has friction that is undetermined at rest: in the model, or among the terms that may be selected.
+/// Whether each joint has friction that is undetermined at rest, in the model or among the terms that can be
+/// selected.
 pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSearch]) -> Vec<bool> {
     let names = robot.joint_names();
     let in_model = |joint: usize| {
@@ -66,9 +69,9 @@ pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSear
     names.iter().enumerate().map(|(joint, name)| in_model(joint) || may_be_chosen(name)).collect()
 }
 
-/// Ranges of samples at which a joint with velocities `dq` is at rest: slower than [`MOVING`] times its highest speed.
-/// Half of the smoothing window (`smoothing` samples) around longer rests is included, because the joint breaks loose
-/// and stops suddenly, but the smoothed motion does not.
+/// Ranges of samples at which a joint with velocities `dq` is at rest: slower than [`MOVING`] times its highest
+/// velocity. Half of the smoothing window (`smoothing` samples) around longer rests is included. There the joint
+/// breaks loose and stops suddenly, but the smoothed motion does not.
 fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
     let mut found = slower(dq, MOVING);
     for rest in &mut found {

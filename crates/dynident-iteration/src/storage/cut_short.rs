@@ -1,4 +1,4 @@
-//! A run that was interrupted or failed: it is not used, its log is kept next to the runs, and the next call repeats
+//! A run that was interrupted or failed. It is not used, its log is kept next to the runs, and the next call repeats
 //! it.
 
 use crate::robot::RobotRun;
@@ -6,7 +6,7 @@ use crate::setup::error::IterationError;
 use crate::setup::status::IterationStatus;
 use crate::storage::store::IterationStore;
 
-/// Why a run was cut short, with its outcome in words.
+/// Why a run ended early, with a description of its outcome.
 #[derive(Clone, Debug)]
 pub(crate) enum CutShort {
     Interrupted(String),

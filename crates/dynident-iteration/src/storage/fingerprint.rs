@@ -1,7 +1,7 @@
-//! Fingerprint of the inputs of an iteration as text: a hash of everything, then one per table.
+//! Fingerprint of the inputs of an iteration as text: a hash of all inputs, then one hash per table of the settings.
 
-/// Describes that runs or a trajectory with the fingerprint `there` belong to other settings than `here`, and names the
-/// tables that differ. A fingerprint is the hash of everything, followed by `name:hash` for each table.
+/// Describes that runs or a trajectory with the fingerprint `there` were made with other settings than `here`, and
+/// names the tables that differ. A fingerprint is the hash of all inputs, followed by `name:hash` for each table.
 ///
 /// ```
 /// let words = dynident_iteration::other_settings("1 design:7 robot:3", "2 design:8 robot:3");

@@ -27,7 +27,7 @@ pub(crate) struct RunsFolder {
 }
 
 impl RunsFolder {
-    /// Reads the folder; changes nothing.
+    /// Reads the names in the folder; changes nothing.
     ///
     /// # Errors
     /// Foreign content at the path of a run, where no run can be stored.
@@ -103,7 +103,8 @@ impl RunsFolder {
         Ok(())
     }
 
-    /// Removes the plans of all runs but `next`, which are obsolete, and the held-out runs after removed runs.
+    /// Removes the plans of all runs except `next`, which are obsolete, and the held-out runs that follow removed
+    /// runs.
     pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
         let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
         let plans = self.planned.iter().filter(|(run, _)| *run != next);

@@ -48,9 +48,9 @@ struct PlanFile {
     forecast: MotionForecast,
 }
 
-/// Folder of an iteration: `runs/run_k/run.json` and the logs next to it. A run appears in one step (rename of a
-/// finished folder after all files are synced to disk), so an iteration that is killed at any moment can resume after
-/// its last complete run.
+/// Folder of an iteration: `runs/run_k/run.json` and the logs next to it. A run appears at once, by renaming a
+/// finished folder after all files are synced to disk. An iteration that is killed at any moment can therefore resume
+/// after its last complete run.
 #[derive(Debug)]
 pub struct IterationStore {
     runs: PathBuf,
@@ -61,11 +61,11 @@ pub struct IterationStore {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunFile {
-    /// [`RUN_SCHEMA`].
+    /// Name and version of the schema, [`RUN_SCHEMA`].
     pub schema: String,
     /// Fingerprint of all inputs of the runs.
     pub fingerprint: String,
-    /// SHA-256 of the rest of the file; a file that was edited or damaged is rejected. Absent in files of earlier
+    /// SHA-256 of the rest of the file; a file that was edited or damaged is rejected. Missing in files of earlier
     /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub content_sha256: Option<String>,
@@ -76,8 +76,8 @@ pub struct RunFile {
 
 impl IterationStore {
     /// Opens or creates the folder. `fingerprint` identifies all inputs of the runs; runs with another fingerprint
-    /// belong to another iteration. Without `resume`, existing runs are removed: only files that an iteration writes,
-    /// and never through a symbolic link.
+    /// belong to another iteration. Without `resume`, existing runs are removed. Only files that an iteration writes
+    /// are removed, and never through a symbolic link.
     ///
     /// # Errors
     /// A folder that cannot be written, runs of another iteration, or foreign files in a run's folder.
@@ -173,9 +173,9 @@ impl IterationStore {
         self.runs.join(format!("{HELD_OUT}{run}"))
     }
 
-    /// Stores a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
-    /// `return_log.csv` if the run had approach and return paths, and `motion.csv` of each motion that differs from the
-    /// task. Removes the plan of the run.
+    /// Stores a run: `run.json`, `log.csv` of each trajectory (`log_2.csv` and so on for further trajectories),
+    /// `approach_log.csv` and `return_log.csv` if the run had approach and return paths, and `motion.csv` of each
+    /// motion that differs from the task. Removes the plan of the run.
     ///
     /// # Errors
     /// A folder that cannot be written; the run is then not stored.
@@ -281,7 +281,7 @@ impl IterationStore {
         sync_folder(fresh.path())?;
         open_to_others(fresh.path())?;
         fs::rename(fresh.path(), folder).map_err(IterationError::file(folder))?;
-        // The folder was renamed, so nothing is left to remove.
+        // The folder was renamed, so there is nothing to remove.
         let _ = fresh.keep();
         sync_folder(&self.runs)
     }
@@ -297,7 +297,7 @@ impl IterationStore {
         RunsFolder::read(&self.runs)?.remove_plans_but(run)
     }
 
-    /// Returns the logs of a run, one per leg, at these rates (Hz), bit for bit as recorded.
+    /// Returns the logs of a run, one per trajectory, at these sampling rates (Hz), bit-identical to the recording.
     ///
     /// # Errors
     /// A log that is missing or invalid.
@@ -318,7 +318,7 @@ impl IterationStore {
         IterationError::State { path: self.run_folder(run).join(RUN_FILE), problem }
     }
 
-    /// Path of the log of a leg (0-based) of a run.
+    /// Path of the log of a trajectory (0-based) of a run.
     pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
         self.run_folder(run).join(log_name(leg))
     }

@@ -1,8 +1,9 @@
-//! Selects one cause for all joints, if one explains them all.
+//! Selects one common cause for all joints, if a single cause explains all differences.
 //!
-//! A log usually has a single mistake. So the candidates are compared over all joints with a relevant difference: a
-//! candidate that explains each of them is reported if its residual is clearly smaller than that of every other such
-//! candidate. If none explains all joints, each joint is evaluated alone, with stricter thresholds.
+//! A log usually has a single mistake. The candidate causes are therefore compared over all joints with a relevant
+//! difference. A candidate that explains each of these joints is reported if its residual is clearly smaller than
+//! that of every other such candidate. If no candidate explains all joints, each joint is evaluated alone, with
+//! stricter thresholds.
 
 use super::CauseSettings;
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
@@ -24,8 +25,8 @@ pub(super) fn agreement(explanations: &[Explanation], thresholds: &CauseSettings
     Agreement { named, left }
 }
 
-/// A candidate that explains every joint with a relevant difference; `None` if there is no such candidate. The inner
-/// options are `None` if the best one is not clearly better than the others.
+/// A candidate that explains every joint with a relevant difference; `None` if there is none. The inner options are
+/// `None` if the best candidate is not clearly better than the others.
 fn for_all(explanations: &[Explanation], thresholds: &CauseSettings) -> Option<Vec<Option<Fitted>>> {
     let matters: Vec<&Explanation> = explanations.iter().filter(|own| own.matters).collect();
     let find =
@@ -46,15 +47,16 @@ fn for_all(explanations: &[Explanation], thresholds: &CauseSettings) -> Option<V
     Some(explanations.iter().map(of).collect())
 }
 
-/// A candidate for each joint with a relevant difference; none at all if one joint remains undetermined, because its
-/// mistake may affect all joints.
+/// A candidate for each joint with a relevant difference. There are no candidates if one joint remains undetermined,
+/// because its mistake may affect all joints.
 fn each_alone(explanations: &[Explanation], thresholds: &CauseSettings) -> Vec<Option<Fitted>> {
     let named: Vec<Option<Fitted>> = explanations.iter().map(|own| alone(own, thresholds)).collect();
     let is_open = explanations.iter().zip(&named).any(|(own, named)| own.matters && named.is_none());
     if is_open { vec![None; explanations.len()] } else { named }
 }
 
-/// The candidate of one joint, if it explains nearly all and clearly more than every other.
+/// The candidate for one joint, if it explains nearly all of the difference, and clearly more than every other
+/// candidate.
 fn alone(own: &Explanation, thresholds: &CauseSettings) -> Option<Fitted> {
     let best =
         *own.candidates.first().filter(|best| own.matters && best.explained >= thresholds.min_explained_share_alone)?;

@@ -4,7 +4,7 @@ use crate::setup::leg::IterationTask;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Largest difference of torque scales that are reported as a common scale.
+/// Largest difference between the torque scales of joints that are reported as one common scale.
 const MAX_COMMON_SCALE_DEVIATION: f64 = 0.02;
 
 /// Why the logged torque of a run differs from the commanded torque.
@@ -21,7 +21,7 @@ pub enum TorqueCause {
         joint: String,
         /// Ratio of logged to commanded torque.
         factor: f64,
-        /// Half the width of its 95 % interval.
+        /// Half-width of the 95 % interval of the ratio.
         half_width_95: f64,
     },
     /// All torques have a wrong unit or scale in the log. Correct the scale.
@@ -34,9 +34,9 @@ pub enum TorqueCause {
     /// of the commanded torque, if the message names the motion).
     #[error("{opposite_sign}", opposite_sign = sign_words(.joints, *.is_commanded))]
     Sign {
-        /// The joints.
+        /// Names of the joints.
         joints: Vec<String>,
-        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
+        /// Whether the log contains the commanded torque, so that only the motion reveals the mistake.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
@@ -45,22 +45,22 @@ pub enum TorqueCause {
     Exchanged {
         /// The joint.
         joint: String,
-        /// The joint whose torque it has.
+        /// The joint whose torque the column contains.
         of: String,
-        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
+        /// Whether the log contains the commanded torque, so that only the motion reveals the mistake.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
     /// The robot compensates gravity itself and logs only the rest. Log the complete torque of the drives.
     #[error("gravity is missing in the logged torque of {}", listed(.joints))]
     Gravity {
-        /// The joints.
+        /// Names of the joints.
         joints: Vec<String>,
     },
     /// The robot compensates friction itself and logs only the rest. Log the complete torque of the drives.
     #[error("friction is missing in the logged torque of {}", listed(.joints))]
     Friction {
-        /// The joints.
+        /// Names of the joints.
         joints: Vec<String>,
     },
     /// The drive delivers less torque than commanded, because it reached its limit. Use a slower motion, or correct the
@@ -69,9 +69,9 @@ pub enum TorqueCause {
     Clipped {
         /// The joint.
         joint: String,
-        /// The limit, Nm (N).
+        /// Torque limit, Nm (N).
         torque: f64,
-        /// Whether the log contains the commanded torque, so that only the motion shows the cause.
+        /// Whether the log contains the commanded torque, so that only the motion reveals the mistake.
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         is_commanded: bool,
     },
@@ -84,7 +84,7 @@ pub enum TorqueCause {
     /// The log uses another clock than the controller. Log the time of the controller.
     #[error("the clock of the log is {difference:.2} % {faster_or_slower} than that of the controller", difference = .percent.abs(), faster_or_slower = if *.percent < 0.0 { "faster" } else { "slower" })]
     Clock {
-        /// Slowness of the log's clock, percent.
+        /// Percentage by which the log's clock is slower than the controller's.
         percent: f64,
     },
     /// The masses that this joint's torque requires differ from those that the other joints require. Correct its torque
@@ -96,9 +96,9 @@ pub enum TorqueCause {
         /// Joints whose scale would explain the difference nearly as well.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         or: Vec<String>,
-        /// Ratio of its torque to the torque that the other joints require.
+        /// Ratio of the joint's torque to the torque that the other joints require.
         factor: f64,
-        /// Half the width of its 95 % interval.
+        /// Half-width of the 95 % interval of the ratio.
         half_width_95: f64,
         /// Whether the logged torque is the commanded one.
         is_commanded: bool,
@@ -117,7 +117,7 @@ pub enum TorqueCause {
 }
 
 impl TorqueCause {
-    /// Suggested fix.
+    /// Suggests a fix.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Scale { .. } | Self::CommonScale { .. } => {
@@ -211,7 +211,7 @@ impl TorqueCandidate {
     }
 }
 
-/// Smallest explained share of the squared difference of listed candidates.
+/// Smallest share of the squared difference that a candidate in the list must explain.
 const MIN_LISTED_SHARE: f64 = 0.5;
 
 pub(super) fn causes(
@@ -250,7 +250,7 @@ pub(super) fn causes(
         let torque = named[joint].map_or(0.0, |found| found.value);
         found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque, is_commanded: false });
     }
-    // Timing is not reliable if the torque differs for another reason.
+    // The timing is not reliable if the torque differs for another reason.
     let has_timing = !explanations.iter().any(|own| own.matters);
     for (joint, explanation) in explanations.iter().enumerate() {
         if explanation.matters && explanation.is_certain && named[joint].is_none() {
@@ -265,7 +265,7 @@ pub(super) fn causes(
     if has_timing {
         found.extend(timing(check, with));
     }
-    // The wrong joint is easier to determine once torque is fed forward.
+    // Once torque is fed forward, it is easier to determine which joint is wrong.
     let is_early = check.source == CommandSource::PathOnly && with.feeds_forward_later;
     if found.is_empty() && !is_early {
         found.extend(row_scale_causes(check, with.row_scales, &names));
@@ -296,8 +296,8 @@ fn scale_causes(
     scaled.iter().map(of_joint).collect()
 }
 
-/// Timing mistakes. If the controller receives positions earlier than the log, it uses their true times: the log is
-/// late.
+/// Reports timing mistakes. If the controller receives positions earlier than the log, it uses their true times, so
+/// the log is late.
 fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     let settings = with.settings;
     let mut found = Vec::new();
@@ -314,7 +314,7 @@ fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     found
 }
 
-/// Joints whose rows contradict those of the others.
+/// Joints whose rows contradict the rows of the other joints.
 fn row_scale_causes(check: &TorqueCheck, row_scales: &[Option<RowScale>], names: &[String]) -> Vec<TorqueCause> {
     let of_joint = |(joint, scale): (usize, &Option<RowScale>)| {
         let RowScale { value, std, is_wrong, or } = scale.as_ref()?;

@@ -8,28 +8,28 @@ use dynident_recording::{DecimationSettings, Decimator, Derivatives, Differentia
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings, Measured, Target};
 
-/// Ratio of the cut-off of the position smoothing to that of the comparison, so that smoothing does not affect the
-/// comparison.
+/// Ratio of the cut-off frequency of the position smoothing to that of the comparison; it is large enough that
+/// smoothing does not affect the comparison.
 const SMOOTHING_RATIO: f64 = 4.0;
-/// Row rate after decimation over the cut-off of the comparison.
+/// Ratio of the row rate after decimation to the cut-off frequency of the comparison.
 const ROWS_PER_CUTOFF: f64 = 4.0;
-/// Shared parameters (finite difference, expected size): delays of positions and velocities in the controller, lag of
-/// the logged torque (s), relative rate of the log's clock, delay of the feed-forward torque (s). The expected sizes
-/// only affect parameters that the rows do not determine, or that another law explains.
+/// Shared parameters, each with (finite difference, expected size): delays of positions and velocities in the
+/// controller, lag of the logged torque (s), relative rate of the log's clock, delay of the feed-forward torque (s).
+/// The expected sizes only affect parameters that the rows do not determine, or that another control law explains.
 const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 5e-3), (1e-3, 5e-3), (1e-3, 5e-3), (1e-4, 2e-3), (1e-3, 5e-3)];
 
-/// Start values of the delay for drives with unknown gains (s): a position delay looks like a stiffer loop.
+/// Start values of the delay (s) for drives with unknown gains: a delay of positions looks like a stiffer loop.
 const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02];
 
-/// How the torque follows from reference and positions.
+/// Law by which the commanded torque follows from reference and positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum CommandLaw<'a> {
     /// A completely known control law: one column, the commanded torque.
     Known { controller: &'a ControllerSettings, model: Option<&'a ControllerModel> },
-    /// The drives close their own position loop with unknown gains. The columns are the feed-forward torque, the
+    /// The drives have their own position loop with unknown gains. The columns are the feed-forward torque, the
     /// position error, its rate and its integral.
     OwnLoop {
-        /// Model of the feed-forward torque; `None` in a run with only a path.
+        /// Model of the feed-forward torque; `None` in a run in which the drives receive only a path.
         model: Option<&'a ControllerModel>,
     },
 }
@@ -69,8 +69,8 @@ pub(super) struct ObservedLeg<'a> {
 }
 
 impl<'a> LoggedMotion<'a> {
-    /// The motion, smoothed below `smoothing_hz`, or from differences of neighbouring samples; `None` if it is too
-    /// short or not finite.
+    /// Creates the motion, smoothed below `smoothing_hz` or from differences of neighbouring samples; `None` if it is
+    /// too short or not finite.
     pub(super) fn new(leg: &'a Leg, record: &Record, smoothing_hz: Option<f64>) -> Option<Self> {
         let (joints, samples) = (record.joints.len(), record.samples);
         if samples < 4 || joints != leg.reference().joints() {
@@ -99,7 +99,7 @@ impl<'a> LoggedMotion<'a> {
 }
 
 impl<'a> ObservedLeg<'a> {
-    /// The log below `cutoff_hz`; `None` if it is too short for the filter or not finite.
+    /// Creates the log filtered below `cutoff_hz`; `None` if it is too short for the filter or not finite.
     pub(super) fn new(leg: &'a Leg, record: &Record, cutoff_hz: f64) -> Option<Self> {
         let motion = LoggedMotion::new(leg, record, Some(SMOOTHING_RATIO * cutoff_hz))?;
         let (rate_hz, joints) = (motion.rate_hz, motion.joints);
@@ -191,7 +191,7 @@ impl LoggedMotion<'_> {
         out
     }
 
-    /// Calls `then` with each sample, its time, and the target and measurement of the controller.
+    /// Calls `then` for each sample with its time, and the target and measurement of the controller.
     fn each_instant(&self, timing: &[f64; SHARED], then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>)) {
         let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate, _] = *timing;
         let [mut q, mut dq, mut ddq, mut seen_q, mut seen_dq] = [(); 5].map(|()| vec![0.0; self.joints]);

@@ -1,8 +1,9 @@
-//! Candidates that explain why the logged torque of a joint differs from the commanded torque.
+//! Candidate causes of a difference between logged and commanded torque of a joint.
 //!
-//! Each candidate is a correction of the commanded torque `u` with few unknowns and a free constant. A candidate
-//! explains the share `1 − RSS_c / RSS_0` of the squared difference. It is reported only if it explains nearly all, and
-//! clearly more than every other.
+//! Each candidate is a correction of the commanded torque with few unknowns and a free constant. With the residual
+//! sum of squares RSS_c after the correction and RSS_0 before it, a candidate explains the share `1 − RSS_c / RSS_0`
+//! of the squared difference. It is reported only if it explains nearly all, and clearly more than every other
+//! candidate.
 
 use super::separable_fit::{JointColumns, centred, coefficients, dot, residual_of, rms, square};
 use crate::setup::leg::IterationTask;
@@ -10,35 +11,35 @@ use crate::setup::torque_check_settings::TorqueCheckSettings;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 
-/// Number of rows per independent row: the residuals of neighbouring rows are correlated.
+/// Number of rows per independent row, because the residuals of neighbouring rows are correlated.
 const CORRELATED_ROWS: f64 = 3.0;
-/// Smallest number of degrees of freedom of a candidate's fit. In a run of a few strokes the candidates are not
-/// distinguishable; only saturation is detected earlier.
+/// Minimum number of degrees of freedom of a candidate's fit. If a run contains only a few moves, candidates cannot
+/// be distinguished; only saturation is detected earlier.
 const MIN_DEGREES_OF_FREEDOM: f64 = 16.0;
-/// Smallest share of the torque from the position error, with negative gain, that indicates a wrong sign of the logged
-/// torque.
+/// The sign of the logged torque is probably wrong if at least this share of the torque comes from the position error
+/// with a negative gain.
 const MIN_REVERSED_SHARE: f64 = 0.3;
-/// Largest relative variation of gravity that is treated as constant.
+/// Largest relative variation of a gravity torque that is treated as constant.
 const MAX_GRAVITY_VARIATION: f64 = 0.05;
-/// Number of time blocks of the jackknife of a scale.
+/// Number of time blocks for the jackknife of a scale.
 const BLOCKS: usize = 10;
-/// Trial widths of friction steps, as shares of the joint's highest speed.
+/// Widths of smoothed sign functions that are tested, as shares of the joint's highest velocity.
 const STEP_WIDTHS: [f64; 3] = [0.02, 0.08, 0.3];
-/// Rows with torque below this share of the largest are not saturated.
+/// Rows with torque below this share of the largest torque are not saturated.
 const UNSATURATED_SHARE: f64 = 0.85;
-/// Number of trial torque limits, evenly spaced up to the largest commanded torque.
+/// Number of torque limits that are tested, evenly spaced up to the largest commanded torque.
 const CLIP_TRIALS: usize = 40;
 
-/// A candidate, without its numbers.
+/// Kind of a candidate cause, without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TorqueCandidate {
-    /// Another positive scale.
+    /// The torque has another positive scale.
     Scale,
-    /// A reversed sign.
+    /// The sign of the torque is reversed.
     Sign,
-    /// The torque of another joint.
+    /// The torque is that of another joint.
     Exchanged,
     /// Gravity is missing.
     Gravity,
@@ -70,7 +71,8 @@ pub(super) struct Explanation {
     pub(super) matters: bool,
     /// Squared difference as a share of the squared torque.
     pub(super) difference_share: f64,
-    /// Whether a difference without a cause is reported: one from a completely known control law, or a scale.
+    /// Whether the difference is reported even if its cause is unknown: it is based on a completely known control
+    /// law, or it is a scale.
     pub(super) is_certain: bool,
     /// All candidates, best first; empty if the difference is not relevant.
     pub(super) candidates: Vec<Fitted>,
@@ -80,7 +82,7 @@ pub(super) struct Explanation {
 pub(super) struct JointData<'a> {
     pub(super) task: &'a IterationTask,
     pub(super) torque: &'a [Vec<f64>],
-    /// The first column is the commanded or feed-forward torque; others belong to the drives' own loop.
+    /// The first column is the commanded or feed-forward torque; other columns belong to the drives' own loop.
     pub(super) columns: &'a [JointColumns],
     pub(super) q: &'a [Vec<f64>],
     pub(super) dq: &'a [Vec<f64>],
@@ -91,7 +93,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let size = rms(y).max(f64::MIN_POSITIVE);
     let (first, own_loop) = columns.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
-    // Correct log: scale one, with the fitted loop of the drives.
+    // Hypothesis of a correct log: the scale is one, with the fitted loop of the drives.
     let without_feed_forward: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
     let difference = residual_of(own_loop, &without_feed_forward, &coefficients(own_loop, &without_feed_forward));
     let total = square(&difference).max(f64::MIN_POSITIVE);
@@ -125,7 +127,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     }
     let free = Free { coefficients: &free, has_scale: scale_std.is_finite(), pushes_away };
     let candidates = candidates(data, joint, &free, &without_feed_forward, total);
-    // Another joint with the same torque is not a rival of the best candidate.
+    // Another joint with the same torque is not an alternative to the best candidate.
     for one in candidates {
         if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
             out.candidates.push(one);
@@ -137,16 +139,17 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
 struct Free<'a> {
     coefficients: &'a [f64],
     has_scale: bool,
-    /// Whether the drive seems to push away from the path.
+    /// Whether the drive appears to push away from the path.
     pushes_away: bool,
 }
 
-/// Possible causes of a joint's difference `beside` between logged and commanded torque, best first. `total` is the
-/// squared difference without the part of the drives' own loop.
+/// Possible causes of the difference `beside` between a joint's logged and commanded torque, best first. `total` is
+/// the squared difference without the part that the drives' own loop explains.
 fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64], total: f64) -> Vec<Fitted> {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let own_loop = columns.get(1..).unwrap_or_default();
-    // Per independent row, so that many unknowns do not explain the difference by their number.
+    // Per independent row, so that a candidate with many unknowns does not explain the difference by their number
+    // alone.
     let independent = y.len() as f64 / CORRELATED_ROWS;
     let fitted = |candidate, value, left: &[f64], unknowns: usize| {
         let freedom = independent - unknowns as f64;
@@ -196,7 +199,7 @@ pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
     [gravity, joints.map(|joint| friction_columns(data, joint)).collect()]
 }
 
-/// Viscous friction, and steps of several widths.
+/// Columns of viscous friction, and of smoothed sign functions of several widths.
 pub(super) fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
     let dq = &data.dq[joint];
     let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
@@ -219,7 +222,7 @@ fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
     (0..data.torque.len()).filter(|&other| other != joint).filter_map(of).collect()
 }
 
-/// A torque limit. The gains of drives with their own loop follow from the rows below it.
+/// Candidate of a torque limit. The gains of drives with their own loop are fitted to the rows below it.
 fn clipped(y: &[f64], columns: &[Vec<f64>], total: f64) -> Option<Fitted> {
     let (first, own_loop) = columns.split_first()?;
     let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
@@ -237,7 +240,7 @@ fn clipped(y: &[f64], columns: &[Vec<f64>], total: f64) -> Option<Fitted> {
     (1..CLIP_TRIALS).map(at).max_by(|a, b| a.explained.total_cmp(&b.explained))
 }
 
-/// The columns of the joint's gravity torque for the mass and the first moments of each body.
+/// Columns of the joint's gravity torque with respect to the mass and the first moments of each body.
 fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> {
     let model = data.task.robot.model();
     let (dof, count) = (model.dof(), model.inertial_count());
@@ -255,8 +258,9 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
     (!columns.is_empty()).then_some(columns)
 }
 
-/// Whether the constant that the log lacks is a gravity torque that is independent of the posture, as for a vertical
-/// slide: half to twice that of the robot description, and more than the smallest relevant share of the torque.
+/// Whether the constant that the log lacks is a gravity torque that does not depend on the posture, as for a vertical
+/// slide. It must be half to twice that of the robot description, and more than the smallest relevant share of the
+/// torque.
 fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, beside: &[f64], percent: f64) -> bool {
     let nominal = nominal_gravity(data, joint);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;

@@ -1,15 +1,17 @@
 //! Compares the logged torque of a run with the torque that its controller commanded.
 //!
-//! Identification uses the logged torque as the torque of the drives. The log alone cannot confirm this: a wrong scale,
-//! a reversed sign or subtracted gravity yields the model of another robot, which may even track well. But controller,
-//! model and reference of a run are known, so the commanded torque follows from the logged positions. For a correct log
-//! both agree except for noise, delays and the offset of the torque sensor:
+//! Identification uses the logged torque as the torque of the drives. The log alone cannot confirm this: a wrong
+//! scale, a reversed sign or subtracted gravity yields the model of another robot, which can even track well. But
+//! controller, model and reference of a run are known, so the commanded torque follows from the logged positions. For
+//! a correct log both torques agree, except for noise, delays and the offset of the torque sensor:
 //!
 //! `τ_log,j(t) = s_j τ_cmd,j(t − l; q(t − l − d_q), q̇(t − l − d_v), (1 + ε)(t − l)) + c_j`
 //!
-//! with the scale `s_j` = 1, two delays of the feedback, a lag of the logged torque and a rate ε of the log's clock
-//! that all joints share. Drives that close their own loop have unknown gains `k`: there
-//! `τ_log,j = s_j τ_ff,j + k_p e_j + k_i ∫e_j + k_d ė_j + c_j`, over all good runs together.
+//! `s_j` = 1 is the torque scale of joint j and `c_j` an offset. All joints share two delays of the feedback (d_q of
+//! positions, d_v of velocities), a lag l of the logged torque and a relative rate error ε of the log's clock. Drives
+//! with their own position loop have unknown gains `k_p`, `k_i` and `k_d`. With the feed-forward torque `τ_ff,j` and
+//! the position error `e_j`, `τ_log,j = s_j τ_ff,j + k_p e_j + k_i ∫e_j + k_d ė_j + c_j`, over all good runs
+//! together.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -17,7 +19,7 @@
 //! | `separable_fit` | scales and timing by least squares |
 //! | `explanation` | the candidates that explain a difference |
 //! | `row_scale` | the torque scale of each joint from the parameters that several joints share |
-//! | `response` | whether the motion fits the torque |
+//! | `response` | whether the motion agrees with the torque |
 //! | `agreement` | one cause for all joints, if one explains them all |
 //! | `causes` | combines the results of single joints |
 
@@ -45,25 +47,26 @@ use response::{early_causes, limit_causes};
 use separable_fit::{SHARED, SeparableFit, separable_fit};
 use serde::{Deserialize, Serialize};
 
-/// Cut-off of the comparison for identification without a filter, Hz for an arm of 1.2 m.
+/// Cut-off frequency of the comparison if the identification uses no filter, Hz for an arm of 1.2 m.
 const USUAL_CUTOFF_HZ: f64 = 8.0;
 const MAX_POINTS: usize = 150;
-/// Smallest number of cycles of the cut-off in a run.
+/// Minimum number of periods of the cut-off frequency in a run.
 const MIN_CYCLES_PER_RUN: f64 = 12.0;
-/// Largest ratio of the squared differences for which another timing is used.
+/// Another timing is used if the ratio of the squared differences with and without it is at most this.
 const MAX_RESIDUAL_RATIO: f64 = 0.5;
 const MIN_ROWS: usize = 20;
 
-/// Source of the commanded torque.
+/// Origin of the commanded torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CommandSource {
-    /// The control law with its model.
+    /// Computed with the control law and its model.
     Controller,
-    /// The torque that is fed forward to drives with their own position loop.
+    /// The torque that drives with their own position loop receive as feed-forward.
     FeedForward,
-    /// Unknown: drives with their own position loop only receive a path. A scale that all joints share is not checked.
+    /// Unknown: drives with their own position loop receive only a path. A scale that all joints share is then not
+    /// checked.
     PathOnly,
 }
 
@@ -73,15 +76,15 @@ pub enum CommandSource {
 pub struct JointTorqueCheck {
     /// Ratio of logged to commanded torque; `None` if the run does not determine it.
     pub scale: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of the scale.
     pub scale_std: Option<f64>,
     /// Root mean square of the difference between logged and commanded torque without its mean, in percent of the
     /// logged torque; `None` if the commanded torque is unknown.
     pub difference_percent: Option<f64>,
-    /// Torque scale relative to the other joints, from the parameters that their rows share; `None` if these do not
-    /// determine it.
+    /// Torque scale relative to the other joints, from the parameters on which the torques of several joints depend;
+    /// `None` if these do not determine it.
     pub row_scale: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of the relative scale.
     pub row_scale_std: Option<f64>,
     /// Commanded and logged torque of some samples, Nm (N); empty if the commanded torque is unknown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -101,13 +104,13 @@ pub struct TorqueCheck {
     /// Standard deviation of the delay between positions and torques of the log, s; `None` if unknown.
     #[serde(default)]
     pub torque_lag_std_s: Option<f64>,
-    /// Slowness of the log's clock relative to the controller's, percent.
+    /// Percentage by which the log's clock is slower than the controller's.
     pub clock_percent: f64,
     /// Standard deviation of `clock_percent`; `None` if the commanded torque is unknown.
     pub clock_percent_std: Option<f64>,
     /// The joints.
     pub joints: Vec<JointTorqueCheck>,
-    /// Mistakes; empty if the logged torque is the commanded one.
+    /// Mistakes; empty if the logged torque agrees with the commanded torque.
     pub causes: Vec<TorqueCause>,
 }
 
@@ -126,15 +129,15 @@ pub(crate) struct CheckWith<'a> {
     pub(crate) row_scales: &'a [Option<RowScale>],
     /// Largest accepted delay between positions and torques of a log, s.
     pub(crate) most_lag_s: f64,
-    /// Whether drives with their own loop get feed-forward torque in later runs, which determines each joint's own
-    /// scale.
+    /// Whether drives with their own loop receive feed-forward torque in later runs, which determines the scale of
+    /// each joint.
     pub(crate) feeds_forward_later: bool,
     pub(crate) ended_early: bool,
 }
 
-/// Compares logged with commanded torque; `None` if too little was recorded. `runs` are all runs, the newest
-/// last; earlier ones are only used to determine the gains of drives with their own loop. `task` includes the selected
-/// friction.
+/// Compares the logged with the commanded torque; `None` if too little was recorded. `runs` contains all runs, the
+/// newest last; earlier runs are only used to determine the gains of drives with their own loop. `task` includes the
+/// selected friction.
 pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
     let check = compared(task, runs, with);
     let is_explained = check.as_ref().is_some_and(|check| check.causes.iter().any(TorqueCause::is_determined));
@@ -176,8 +179,8 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
     let mut explanations = explained(&fit.columns);
     let mut found = agreement(&explanations, &with.settings.causes);
     if explanations.iter().any(|own| own.matters) {
-        // Missing torque biases the timing, so the timing is fitted again together with the torques that may be
-        // missing.
+        // Torque that is missing in the log biases the timing, so the timing is fitted again together with the
+        // torques that may be missing.
         let data =
             JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
         for extra in may_be_missing(&data) {
@@ -271,7 +274,7 @@ impl TorqueCheck {
 }
 
 impl TorqueCheck {
-    /// The result without a commanded torque, from the rows alone.
+    /// The result without a commanded torque, from the regressor rows alone.
     fn without_command(source: CommandSource, row_scales: &[Option<RowScale>]) -> Self {
         let joint = |scale: &Option<RowScale>| JointTorqueCheck {
             row_scale: scale.as_ref().map(|scale| scale.value),
@@ -320,8 +323,8 @@ fn law_of<'a>(run: &CheckedRun<'a>) -> CommandLaw<'a> {
     }
 }
 
-/// The cut-off below which torques are compared: that of the identification, if stated. For a run that ended early it
-/// is higher, so that enough rows are left.
+/// The cut-off frequency below which torques are compared: that of the identification, if it has one. For a run that
+/// ended early it is higher, so that enough rows remain.
 fn cutoff_hz(task: &IterationTask, identification: &RunIdentificationSettings, run: &CheckedRun<'_>) -> f64 {
     let stated = identification.parallel_filter.as_ref().and_then(|filter| filter.cutoff_hz);
     let usual = stated.unwrap_or_else(|| task.robot.model().characteristic_scale().hertz(USUAL_CUTOFF_HZ));

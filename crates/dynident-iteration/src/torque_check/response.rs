@@ -1,12 +1,13 @@
-//! Checks whether the motion fits the torque. If the log contains the commanded torque, it does not show that drives
-//! deliver another torque; and a robot that runs away is stopped before the log is long enough for a fit.
+//! Checks whether the motion agrees with the torque. A log that contains the commanded torque does not show that
+//! drives deliver another torque. And a robot that runs away is stopped before the log is long enough for a fit.
 //!
-//! * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
-//!   command of joint j, its own with the opposite sign, or its own up to a limit. In the motion, if the log contains
-//!   the commanded torque: the acceleration of joint i follows the torque of joint j without gravity, or decreases
-//!   while its own increases. Constants are free, so wrong masses have no effect.
-//! * Saturation: the rows of the joint fit a model much better with limited torque, `clamp(τ_j, ±L) = W_j θ_j +
-//!   friction`, than with the logged torque. θ_j is free, so no robot description is needed.
+//! * Exchanged joints and a reversed sign are detected within tenths of a second. In the log, the torque of joint i
+//! is the command of joint j, the command of joint i with the opposite sign, or the command of joint i up to a limit.
+//! If the log contains the commanded torque, the motion is used: the acceleration of joint i follows the torque of
+//! joint j without gravity, or decreases while the joint's own torque increases. Constants are free, so wrong masses
+//! have no effect.
+//! * Saturation: a model with limited torque, `clamp(τ_j, ±L) = W_j θ_j + friction`, fits the rows of joint j much
+//! better than the logged torque. θ_j is free, so no robot description is needed.
 
 use super::command::LoggedMotion;
 use super::explanation::{JointData, friction_columns};
@@ -15,14 +16,14 @@ use super::{CheckedRun, TorqueCause};
 use crate::setup::leg::IterationTask;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 
-/// Cut-off of the smoothed motion of a run that ended early, as a share of the sampling rate, and the smallest number
-/// of samples for smoothing.
+/// Cut-off frequency of the smoothed motion of a run that ended early, as a share of the sampling rate, and minimum
+/// number of samples for smoothing.
 const SMOOTHING_SHARE: f64 = 0.2;
 const MIN_SMOOTHED_SAMPLES: usize = 30;
-/// Time before the stop that is compared, s; earlier the robot still followed.
+/// Time before the stop that is compared, s; before that the robot still followed its trajectory.
 const BEFORE_STOP_S: f64 = 1.0;
 const MIN_SAMPLES: usize = 5;
-/// Trial delays of positions and velocities in the controller, s; a filter makes velocities later.
+/// Tested delays of positions and velocities in the controller, s; a filter makes velocities later than positions.
 const DELAYS_S: [[f64; 2]; 8] = [
     [0.0, 0.0],
     [0.0, 0.002],
@@ -33,37 +34,39 @@ const DELAYS_S: [[f64; 2]; 8] = [
     [0.01, 0.01],
     [0.01, 0.015],
 ];
-/// Largest relative squared difference of equal torques, and smallest of different torques.
+/// Largest relative squared difference of torques that are treated as equal, and smallest of torques that are treated
+/// as different.
 const MAX_EQUAL_DIFFERENCE: f64 = 0.1;
 const MIN_OTHER_DIFFERENCE: f64 = 0.5;
-/// Largest ratio of the residuals of the best and the second-best explanation.
+/// Largest accepted ratio of the residuals of the best and the second-best explanation.
 const MAX_BEST_RESIDUAL_RATIO: f64 = 0.25;
-/// Correlation between torque and acceleration: smallest negative correlation of a joint that moves against its torque,
-/// smallest correlation of a joint that follows a torque, largest correlation of a joint that follows another torque.
+/// Thresholds for the correlation between torque and acceleration: minimum magnitude of the negative correlation of a
+/// joint that moves against its torque, minimum correlation of a joint that follows a torque, and maximum correlation
+/// with its own torque of a joint that follows another torque.
 const MIN_OPPOSITE_CORRELATION: f64 = 0.7;
 const MIN_FOLLOWING_CORRELATION: f64 = 0.9;
 const MAX_UNRELATED_CORRELATION: f64 = 0.3;
-/// Smallest ratio of mean velocity to mean speed of a joint that runs away. In an oscillation the torque of a delayed
-/// drive also opposes the acceleration.
+/// A joint runs away if the ratio of its mean velocity to its mean speed is at least this. In an oscillation, the
+/// torque of a delayed drive also opposes the acceleration.
 const MIN_ONE_WAY_RATIO: f64 = 0.8;
-/// Smallest speed relative to the fastest joint; slower joints are moved by other joints.
+/// Smallest speed relative to the fastest joint; slower joints may be moved by other joints.
 const MIN_SPEED_RATIO: f64 = 0.5;
 
-/// Trial limits of a logged torque as shares of its largest value, which noise increases beyond the limit.
+/// Tested limits of a logged torque as shares of its largest value, which noise increases beyond the limit.
 const LOG_LIMIT_SHARES: [f64; 5] = [0.92, 0.94, 0.96, 0.98, 1.0];
 /// Smallest ratio of a command to the limit that it exceeds.
 const MIN_EXCESS_RATIO: f64 = 1.05;
 /// Largest relative squared residual of a limited command.
 const MAX_LIMITED_RESIDUAL: f64 = 0.02;
-/// Trial limits in a motion as shares of the largest logged torque.
+/// Tested limits in a motion as shares of the largest logged torque.
 const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
 const ALL_SHARES: f64 = 40.0;
-/// Smallest share of the squared relative residual that a limit explains.
+/// Minimum share of the squared relative residual that a limit must explain.
 const MIN_EXPLAINED_SHARE: f64 = 0.65;
-/// Smallest relative residual without a limit for which a limit is fitted.
+/// Minimum relative residual without a limit for which a limit is fitted.
 const MIN_RELATIVE_RESIDUAL: f64 = 0.01;
 const MIN_ROWS_PER_UNKNOWN: usize = 3;
-/// Smallest number of rows at the limit, and their largest share.
+/// Minimum number of rows at the limit, and maximum share of rows at the limit.
 const MIN_ROWS_AT_LIMIT: usize = 4;
 const MAX_SHARE_AT_LIMIT: f64 = 0.5;
 
@@ -83,7 +86,7 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
         let commanded = rows(&commanded);
         Some((by_command(&logged, &commanded), commanded))
     });
-    // Use the delays with the fewest undetermined joints; light joints have little torque beyond noise.
+    // The delays with the fewest undetermined joints are used; light joints have little torque beyond noise.
     let is_open = |own: &Assignment| *own == Assignment::Open;
     let open = |found: &[Assignment]| found.iter().filter(|own| is_open(own)).count();
     let Some((found, commanded)) = commanded.min_by_key(|(found, _)| open(found)) else { return Vec::new() };
@@ -119,7 +122,7 @@ fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64
     (0..logged.len()).filter_map(of_joint).collect()
 }
 
-/// The torque that a joint has in the log or follows in the motion.
+/// The torque that a joint has in the log, or that it follows in the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Assignment {
     Own,
@@ -128,7 +131,7 @@ enum Assignment {
     Open,
 }
 
-/// The commanded torque that each joint has in the log. Joints are only exchanged in pairs.
+/// The commanded torque that each joint has in the log. Joints can only be exchanged in pairs.
 fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
     let joints = logged.len();
     let share = |to: usize, from: usize, sign: f64| {
@@ -209,7 +212,7 @@ fn gravity_along(task: &IterationTask, observed: &LoggedMotion<'_>) -> Vec<f64> 
     out
 }
 
-/// Joints with a saturated drive although the log contains a larger torque.
+/// Joints whose drives are saturated although the log contains a larger torque.
 pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
     let names = data.task.robot.joint_names();
     let of_joint = |joint: usize| {
@@ -219,8 +222,8 @@ pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
     (0..data.torque.len()).filter_map(of_joint).collect()
 }
 
-/// Torque limit of a joint from its motion, Nm (N), although the log contains a larger torque; `None` if no limit
-/// explains the motion clearly better.
+/// Torque limit of a joint from its motion, Nm (N), if the log contains a larger torque; `None` if no limit explains
+/// the motion clearly better.
 fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
     let y = &data.torque[joint];
     let columns: Vec<Vec<f64>> = model_columns(data, joint).into_iter().chain(friction_columns(data, joint)).collect();

@@ -1,17 +1,17 @@
 //! Scale of each joint's torque from the parameters that several joints share.
 //!
-//! Masses and inertias of a body affect the torque of all joints before it. If the torque of one joint is scaled, its
-//! rows require other values of these parameters than the rows of the other joints. Around an estimate θ̂ the torque of
-//! joint j with the scale `1 + κ_j` is
+//! Masses and inertias of a body affect the torque of all joints between the base and the body. If the torque of one
+//! joint is scaled, its rows require other values of these parameters than the rows of the other joints. Around an
+//! estimate θ̂, the torque of joint j with the scale `1 + κ_j` and the regressor W_j is
 //!
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
 //!
-//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so it is not
-//! detectable. Each joint is tested against all others: its κ is free, the others are zero. The joint whose κ maximises
-//! the likelihood is reported as wrong, and the others are tested again with its κ free. Model errors (stiction,
-//! backlash) affect the scales of all joints, so a deviation must also exceed those of the others. Parameters that only
-//! one joint determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
-//! with the others gets a wide error bar.
+//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so it cannot be
+//! detected. Each joint is tested against all others: its κ is free, the others are zero. The joint whose κ maximises
+//! the likelihood is reported as wrong, and the other joints are tested again with its κ free. Model errors
+//! (stiction, backlash) affect the scales of all joints, so a deviation must also exceed those of the other joints.
+//! Parameters on which only one joint depends (its friction and drive inertia) contribute nothing; a joint that
+//! depends little on shared parameters gets a wide error bar.
 
 use crate::estimation::estimate::RunEstimate;
 use crate::estimation::run_logs::{RunLog, identification_settings, recordings};
@@ -23,20 +23,20 @@ use dynident_identification::estimators::estimate;
 use dynident_identification::payload::with_free_gains;
 use dynident_identification::{Execution, Logs, RegressorModel, training_rows};
 
-/// Largest standard deviation of a determined scale.
+/// Largest standard deviation with which a scale is treated as determined.
 const MAX_SCALE_STD: f64 = 0.3;
-/// Smallest share of a joint's torque that no other parameter explains; below it model errors are amplified.
+/// Minimum share of a joint's torque that no other parameter explains; with less, model errors are amplified.
 const MIN_OWN_SHARE: f64 = 0.02;
 /// Largest deviation for which the linearisation is valid.
 const MAX_DEVIATION: f64 = 0.6;
-/// Largest difference of the log-likelihood at which the scale of another joint explains the rows nearly as well: three
-/// and a half standard deviations of independent rows.
+/// Largest difference of the log-likelihood at which the scale of another joint explains the rows nearly as well: 3.5
+/// standard deviations for independent rows.
 const MAX_LOG_LIKELIHOOD_DIFFERENCE: f64 = 6.0;
 
 /// Ratio of the median absolute deviation of a normal distribution to its standard deviation.
 const MEDIAN_TO_STD: f64 = 0.6745;
-/// Smallest number of other joints from which the model error is estimated, and the assumed spread for fewer joints. A
-/// correct SCARA, in which only the first two joints share parameters, reached five standard deviations.
+/// Minimum number of other joints from which the model error is estimated, and the spread that is assumed for fewer
+/// joints. A correct SCARA, in which only the first two joints share parameters, reached five standard deviations.
 const MIN_OTHER_JOINTS: usize = 3;
 const DEFAULT_SPREAD: f64 = 2.0;
 
@@ -46,11 +46,11 @@ pub(crate) struct RowScale {
     pub(crate) value: f64,
     pub(crate) std: f64,
     pub(crate) is_wrong: bool,
-    /// Joints whose scale explains the rows nearly as well, if it is wrong.
+    /// Joints whose scale would explain the rows nearly as well, if this scale is wrong.
     pub(crate) or: Vec<usize>,
 }
 
-/// The smallest relevant deviation: share of the torque, and number of standard deviations.
+/// The smallest relevant deviation, as a share of the torque and as a number of standard deviations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LeastDeviation {
     pub(crate) share: f64,
@@ -110,7 +110,7 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
         };
         let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
         let worst = open.iter().copied().filter(is_relevant).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
-        // At most half of the joints can be wrong relative to the rest.
+        // At most half of the joints can be wrong relative to the others.
         let is_outlier = |&worst: &usize| {
             let with_it: Vec<usize> = chosen.iter().copied().chain([worst]).collect();
             let spread = spread(&deviations(problem, values, &with_it), &with_it);
@@ -141,8 +141,8 @@ fn deviations(problem: &LinearProblem, values: &[f64], chosen: &[usize]) -> Vec<
     (0..problem.joints().len()).map(of_joint).collect()
 }
 
-/// Standard deviation of the deviations of the joints that are not `chosen`, in units of their own standard deviations;
-/// at least one. The median is robust against another wrong joint.
+/// Standard deviation of the deviations of the joints that are not in `chosen`, in units of their own standard
+/// deviations; at least one. It is computed from the median, which is robust against another wrong joint.
 fn spread(found: &[Option<Kappa>], chosen: &[usize]) -> f64 {
     let others = found.iter().enumerate().filter(|(joint, _)| !chosen.contains(joint));
     let mut sizes: Vec<f64> = others.filter_map(|(_, kappa)| kappa.map(|own| (own.value / own.std).abs())).collect();
@@ -157,7 +157,7 @@ struct Kappa {
     log_likelihood: f64,
 }
 
-/// κ of the joint `free[place]`, with free κ of all joints in `free`.
+/// κ of the joint `free[place]`, with the κ of all joints in `free` estimated together.
 fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<Kappa> {
     let columns = problem.columns().len();
     let without_load = vec![vec![0.0; columns]; problem.logs().len()];
@@ -166,8 +166,8 @@ fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) 
     let column = columns + place;
     let (value, std) = (found.values[column], found.std[column]);
     let is_fixed = found.rank.fixed.iter().any(|fixed| fixed.column == column);
-    // For white noise the standard deviation is σ over the norm of the predicted torque that is orthogonal to the other
-    // columns.
+    // For white noise the standard deviation is σ divided by the norm of the predicted torque's component that is
+    // orthogonal to the other columns.
     let joint = free[place];
     let of_joint = problem.equations().iter().filter(|equation| equation.joint == joint);
     let norm = of_joint.map(|equation| equation.factor.total().torque_norm().powi(2)).sum::<f64>().sqrt();

@@ -1,19 +1,20 @@
-//! Separable least squares: a few nonlinear timing parameters that all joints share, and linear coefficients of each
-//! joint.
+//! Separable least squares: a few nonlinear timing parameters p that all joints share, and linear coefficients c_j of
+//! each joint.
 //!
-//! `min Σ_j ‖y_j − A_j(p) c_j‖² / σ_j² + Σ_i p_i² / s_i²` over the shared p and the coefficients c_j. The coefficients
-//! are eliminated (Golub and Pereyra, Inverse Problems 19 (2003) R1, variable projection); p follows from Gauss-Newton
-//! steps with finite differences of the projected residuals. σ_j is the residual of joint j, so that a joint that no p
-//! explains has little effect on p.
+//! Minimises `Σ_j ‖y_j − A_j(p) c_j‖² / σ_j² + Σ_i p_i² / s_i²` over the shared p and the coefficients c_j. The
+//! coefficients are eliminated (Golub and Pereyra, Inverse Problems 19 (2003) R1, variable projection). p follows
+//! from Gauss-Newton steps with finite differences of the projected residuals. σ_j is the residual of joint j, so
+//! that a joint that no p explains has little effect on p; s_i is the expected size of p_i.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Largest number of Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs, a wrong
-/// clock needs more.
+/// Maximum number of Gauss-Newton steps. The timing is nearly linear: three steps converge to rounding on most logs;
+/// a wrong clock needs more steps.
 const MAX_STEPS: usize = 15;
-/// Smallest step relative to the finite difference; a smaller one ends the search.
+/// Smallest step relative to the finite difference; the search ends at a smaller step.
 const MIN_RELATIVE_STEP: f64 = 1e-2;
-/// Smallest residual for the weight of a joint, as a share of its torque; exact logs would have infinite weights.
+/// Smallest residual that is used for the weight of a joint, as a share of its torque; without it, exact logs would
+/// have infinite weights.
 const MIN_RESIDUAL_SHARE: f64 = 1e-4;
 /// Singular values below this share of the largest one are treated as zero.
 const RANK_TOLERANCE: f64 = 1e-9;
@@ -52,7 +53,7 @@ pub(super) fn separable_fit(
     starts: &[[f64; SHARED]],
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
-    // There may be several minima: the search begins at the best start value.
+    // There can be several minima, so the search begins at the best start value.
     let starts = starts.iter().map(|start| {
         let shared = *start;
         let at = columns(&shared);

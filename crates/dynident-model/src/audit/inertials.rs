@@ -7,8 +7,8 @@ use crate::spatial::{Mat3, Vec3};
 use crate::tree::{Link, Model};
 use nalgebra::Matrix3;
 
-/// Density of osmium, the densest metal, kg/m³. A solid ball of it has nearly the smallest inertia possible for its
-/// mass.
+/// Density of osmium, the densest metal, kg/m³. A solid sphere of osmium has nearly the smallest inertia that is
+/// possible for its mass.
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
 /// Rounding error of the eigenvalues relative to the inertia about the frame's origin.
 const EIGENVALUE_ROUNDING: f64 = 1e-9;
@@ -54,7 +54,8 @@ fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditS
         return;
     };
     let [least, middle, most] = moments;
-    // The moments are a difference from the inertia about the frame's origin and carry its rounding error.
+    // The moments about the centre of mass are computed as a difference from the inertia about the frame's origin,
+    // and have its rounding error.
     let rounding = EIGENVALUE_ROUNDING * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
         let message = format!(
@@ -99,7 +100,7 @@ fn check_plausible(
             format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}");
         findings.add(if absurd { Problem } else { Warning }, "centre-of-mass-outside", place(), message);
     }
-    // Mean square distance of the mass from its centre: `½ tr(I) / m`.
+    // Mean square distance of the mass from the centre of mass: `½ tr(I) / m`.
     let square = 0.5 * trace(&inertia) / mass;
     if square > (settings.max_distance_lengths * length_m).powi(2) {
         findings.add(
@@ -134,8 +135,8 @@ fn check_plausible(
     }
 }
 
-/// Reports an inertia that was computed about the link's origin but written as if about the centre of mass: without the
-/// parallel-axis term, which is most of the inertia, a consistent body remains.
+/// Reports an inertia that was computed about the link's origin but written as if about the centre of mass. Such an
+/// inertia consists mostly of the parallel-axis term, and a consistent body remains after subtracting this term.
 fn check_reference_point(link: &str, inertial: &InertialParameters, max_share: f64, findings: &mut Findings) {
     let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
     let mass = inertial.mass_kg();

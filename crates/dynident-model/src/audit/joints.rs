@@ -31,7 +31,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
             findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
     }
-    // If all joints have the same origin, no length is left for comparison.
+    // If all joints have the same origin, there is no length for comparison.
     if lengths.reach > 0.0 && lengths.reach < 1e-3 {
         let message = format!("all joint origins lie within {:.2e} m: are lengths in kilometres?", lengths.reach);
         findings.add(Warning, "length-unit", "model".to_owned(), message);
@@ -56,7 +56,7 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
-            // The limits of a mimic joint follow from its sources.
+            // The limits of a mimic joint follow from the limits of the joints that it follows.
             _ if follows => {}
             _ => {
                 let has = "has no position limits: add them before `design`, to <limit> or to [design.limits]";

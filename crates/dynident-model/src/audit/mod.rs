@@ -20,7 +20,7 @@ use crate::tree::Model;
 pub enum AuditLevel {
     /// Information.
     Info,
-    /// A likely mistake, or a value that a later step needs.
+    /// A likely mistake, or a value that is missing for a later step.
     Warning,
     /// Physically inconsistent, or unusable.
     Problem,
@@ -42,7 +42,7 @@ impl AuditLevel {
 pub struct AuditFinding {
     /// Severity.
     pub level: AuditLevel,
-    /// Name of the check; names do not change between versions.
+    /// Name of the check; names are the same in all versions.
     pub check: &'static str,
     /// `model`, `link NAME` or `joint NAME`.
     pub place: String,
@@ -50,8 +50,8 @@ pub struct AuditFinding {
     pub message: String,
 }
 
-/// Audits the inertials of a model's moving links and the limits, lengths and units of its joints. Findings are in the
-/// order of the tree; the first one is a summary of the model.
+/// Audits the inertials of a model's moving links, and the limits, lengths and units of its joints. Findings are in
+/// the order of the tree; the first finding is a summary of the model.
 ///
 /// Checks (`check` of the findings): `summary`, `mass-not-positive`, `mass-absurd`, `inertia-not-positive`,
 /// `triangle-inequality`, `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-against-size`,
@@ -62,7 +62,7 @@ pub fn audit(model: &Model) -> Vec<AuditFinding> {
     findings(model, &AuditSettings::default())
 }
 
-/// As [`audit`], with other thresholds.
+/// Like [`audit`], with other thresholds.
 ///
 /// # Errors
 /// Invalid settings.
@@ -95,7 +95,8 @@ impl Findings {
     }
 }
 
-/// Smallest length of a body, m: the joints of a wrist often intersect in one point.
+/// Smallest assumed length of a body, m. The joints of a wrist often intersect in one point, so their distance is
+/// zero.
 const MIN_BODY_LENGTH_M: f64 = 0.1;
 
 struct Lengths {

@@ -18,7 +18,7 @@ fn check_body(body: &Body, length_m: f64, settings: &AuditSettings, findings: &m
     let place = format!("link {}", body.name());
     let Some((prior, inertia)) = body.prior().and_then(|prior| Some((prior, prior.inertia_at_com()?))) else { return };
     let square = 0.5 * (0..3).map(|k| inertia.0[k][k]).sum::<f64>() / prior.mass_kg();
-    // Bodies with an implausible inertia have a finding that names the likely unit.
+    // If the inertia of a body is implausible, another finding already names the likely unit.
     let is_known = findings.0.iter().any(|finding| {
         finding.place == place
             && matches!(finding.check, "inertia-too-large" | "inertia-too-small" | "mass-not-positive")
@@ -47,8 +47,8 @@ fn check_body(body: &Body, length_m: f64, settings: &AuditSettings, findings: &m
     }
 }
 
-/// Diagonal of the box around the boxes, cylinders, spheres and capsules of a body, m, and whether these are all its
-/// shapes. Meshes are not read.
+/// Diagonal of the box around the boxes, cylinders, spheres and capsules of a body, m, and whether the body has no
+/// other shapes. Meshes are not read.
 fn shape_diagonal(body: &Body) -> (f64, bool) {
     let (mut low, mut high, mut is_complete) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], true);
     for link in &body.links {
@@ -78,7 +78,7 @@ fn shape_diagonal(body: &Body) -> (f64, bool) {
     if diagonal.is_finite() { (diagonal, is_complete) } else { (0.0, is_complete) }
 }
 
-/// Reports a base with mass that carries several limbs: robots with legs or wheels do not stand fixed.
+/// Reports a fixed base with mass that carries several limbs: robots with legs or wheels do not have a fixed base.
 fn check_base(model: &Model, findings: &mut Findings) {
     let limbs = model.tree_joints().iter().filter(|joint| joint.parent.is_none()).count();
     let mass: f64 = model.base().links.iter().filter_map(|link| link.inertial).map(|inertial| inertial.mass_kg()).sum();

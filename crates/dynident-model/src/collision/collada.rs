@@ -5,7 +5,8 @@
 //! gives all its geometries. `<up_axis>` is **not** applied, because URDF tools (RViz, MoveIt, Gazebo, Pinocchio)
 //! ignore it as well.
 //!
-//! This is own code because no crate applies the transforms of several instances of one geometry (decision 0053).
+//! This is a separate implementation, because no crate applies the transforms of several instances of one geometry
+//! (decision 0053).
 
 use super::MeshFault;
 use super::mesh::TriangleMesh;
@@ -14,7 +15,8 @@ use crate::xml::{MAX_NODES, first_excess, parse_number, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashMap;
 
-/// Maximum number of triangle corners, as in the largest STL file; nested instances multiply.
+/// Maximum number of triangle corners, as in the largest STL file. The limit is necessary because nested instances
+/// multiply the corners.
 const MAX_CORNERS: usize = 16_000_000;
 
 /// Maximum number of visited scene nodes, and maximum depth.
@@ -67,7 +69,7 @@ pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
     Ok(TriangleMesh::of_corners(&reader.corners))
 }
 
-/// The scene that the file names, otherwise its first.
+/// The scene that the file names, otherwise the first scene of the file.
 fn scene<'a, 'i>(root: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     let named = child(root, "scene").and_then(|scene| child(scene, "instance_visual_scene"));
     let named = named.and_then(|instance| target(instance, by_id));
@@ -175,7 +177,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 vertices = Some((offset, input));
             }
         }
-        // A limit on the number of inputs bounds the memory.
+        // The limit on the number of inputs bounds the memory.
         if stride > 256 {
             return Err(MeshFault::Face);
         }

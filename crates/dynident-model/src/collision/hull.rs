@@ -1,7 +1,7 @@
 //! Convex hull of points in space.
 //!
-//! Incremental algorithm: each point outside of the hull replaces the faces that it sees by triangles to the rim of
-//! these faces (Preparata and Hong, Comm. ACM 20(2), 1977).
+//! Incremental algorithm: each point outside the hull replaces the faces that are visible from it by triangles to the
+//! rim of these faces (Preparata and Hong, Comm. ACM 20(2), 1977).
 
 use crate::spatial::Vec3;
 use std::collections::HashMap;
@@ -20,7 +20,7 @@ struct Face {
 struct Hull<'p> {
     points: &'p [Vec3],
     faces: Vec<Face>,
-    /// Face to the left of each directed edge.
+    /// The face to the left of each directed edge.
     faces_of_edges: HashMap<[u32; 2], usize>,
     tolerance: f64,
 }
@@ -37,7 +37,7 @@ pub(super) fn convex_hull(points: &[Vec3]) -> Option<Vec<[u32; 3]>> {
     for triangle in [[a, c, b], [a, b, d], [b, c, d], [c, a, d]] {
         hull.add(triangle)?;
     }
-    // Points far from the start first: they make most others interior.
+    // Points far from the start come first: afterwards most other points are inside.
     let centre = corners.iter().fold(Vec3::ZERO, |sum, &corner| sum + points[corner as usize]).scale(0.25);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     let distance = |index: u32| (points[index as usize] - centre).norm();
@@ -48,7 +48,7 @@ pub(super) fn convex_hull(points: &[Vec3]) -> Option<Vec<[u32; 3]>> {
     Some(hull.faces.into_iter().filter(|face| face.is_alive).map(|face| face.corners).collect())
 }
 
-/// Four points of a tetrahedron with positive volume, farther than `least` from a plane.
+/// Four points of a tetrahedron with positive volume; each is farther than `least` from the plane of the others.
 fn simplex(points: &[Vec3], least: f64) -> Option<[u32; 4]> {
     let farthest = |distance: &dyn Fn(Vec3) -> f64| -> Option<u32> {
         let (mut best, mut index) = (least, None);
@@ -131,7 +131,7 @@ impl Hull<'_> {
         Some(())
     }
 
-    /// Removes dead faces.
+    /// Removes deleted faces.
     fn compact(&mut self) {
         self.faces.retain(|face| face.is_alive);
         for (index, face) in self.faces.iter().enumerate() {

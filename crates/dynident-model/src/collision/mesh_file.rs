@@ -97,8 +97,8 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
         .or_else(|| above().find_map(|at| there(at.join(rest))))
 }
 
-/// Reads the unique vertices and the triangles of a mesh in the file's frame and unit; COLLADA states its unit and is
-/// converted to metres.
+/// Reads the unique vertices and the triangles of a mesh in the file's frame and unit. A COLLADA file defines its
+/// unit and is converted to metres.
 ///
 /// # Errors
 /// File not found or not readable, or not an STL, OBJ, MSH or COLLADA file with at least one vertex.
@@ -106,8 +106,8 @@ pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     read_from(folder, name, mesh_text::Shapes::All)
 }
 
-/// As [`read_mesh`], as MuJoCo reads a mesh: coordinates in single precision, and of an OBJ the faces of the first
-/// object or group only.
+/// Like [`read_mesh`], but as MuJoCo reads a mesh: coordinates in single precision, and only the faces of the first
+/// object or group of an OBJ.
 pub(crate) fn read_mujoco_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     let mut mesh = read_from(folder, name, mesh_text::Shapes::First)?;
     for vertex in &mut mesh.vertices {
@@ -129,7 +129,7 @@ fn read_from(folder: &Path, name: &str, shapes: mesh_text::Shapes) -> Result<Tri
 }
 
 fn parse(path: &Path, bytes: &[u8], shapes: mesh_text::Shapes) -> Result<TriangleMesh, MeshFault> {
-    // The format has no signature.
+    // A `.msh` file has no signature at its beginning.
     let is_msh = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("msh"));
     let mesh = if is_msh {
         msh::read(bytes)?

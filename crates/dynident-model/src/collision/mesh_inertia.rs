@@ -63,9 +63,10 @@ pub enum MeshInertiaFault {
 
 /// Computes the mass properties of a mesh. A mesh without triangles is the convex hull of its vertices.
 ///
-/// A surface triangle with corners `D, E, F` and centre `c` spans a pyramid with the volume `V = n·c A/3` from the
-/// origin, its products of inertia are `V/20 Σ (2 D Dᵀ + .. + D Eᵀ + ..)`. `Legacy` takes `|V|`, first from the
-/// centroid of the surface for the centre, then from that centre for volume and inertia.
+/// A surface triangle with corners `D, E, F`, centre `c`, area `A` and unit normal `n` spans a pyramid from the
+/// origin with the volume `V = n·c A/3`. Its products of inertia are `V/20 Σ (2 D Dᵀ + .. + D Eᵀ + ..)`. `Legacy`
+/// uses `|V|`: pyramids from the centroid of the surface for the centre, then pyramids from that centre for volume
+/// and inertia.
 ///
 /// # Errors
 /// An area or volume that is zero or negative, orientations that contradict each other, or vertices without a hull.
@@ -124,7 +125,7 @@ pub fn mesh_inertia(mesh: &TriangleMesh, mode: MeshInertiaMode) -> Result<MeshIn
 
 struct Face {
     area: f64,
-    /// Unit vector; zero for a face without area.
+    /// Unit normal; zero for a face without area.
     normal: Vec3,
     centre: Vec3,
 }
@@ -151,7 +152,8 @@ impl Face {
     }
 }
 
-/// Whether no two faces run along an edge in the same direction. Faces smaller than 3e-8 m² are ignored, as in MuJoCo.
+/// Whether no two faces run along an edge in the same direction (consistent orientation). Faces smaller than 3e-8 m²
+/// are ignored, as in MuJoCo.
 fn is_oriented(vertices: &[Vec3], triangles: &[[u32; 3]]) -> bool {
     let is_large =
         |triangle: &&[u32; 3]| Face::new(triangle.map(|corner| vertices[corner as usize])).area > SMALLEST.sqrt();

@@ -15,11 +15,11 @@ pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
     Ok(TriangleMesh::of_corners(&corners))
 }
 
-/// Which objects and groups (`o`, `g`) of an OBJ give faces.
+/// Selection of the objects and groups (`o`, `g`) of an OBJ whose faces are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shapes {
     All,
-    /// The first one with faces, as in MuJoCo; vertices are always read.
+    /// The first object or group with faces, as in MuJoCo; vertices are always read.
     First,
 }
 
@@ -59,7 +59,8 @@ fn vertex<'t>(words: &mut impl Iterator<Item = &'t str>) -> Result<Vec3, MeshFau
     Ok(Vec3([number()?, number()?, number()?]))
 }
 
-/// Vertex index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`: 1-based, or relative to the last vertex if negative.
+/// Vertex index of a face's corner in the form `i`, `i/t`, `i//n` or `i/t/n`: 1-based, or relative to the last vertex
+/// if negative.
 fn corner(word: &str, count: usize) -> Option<u32> {
     let index: i64 = word.split('/').next()?.parse().ok()?;
     let count = i64::try_from(count).ok()?;

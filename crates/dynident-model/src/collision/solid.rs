@@ -15,7 +15,7 @@ pub struct Solid {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Sides of the prism around a cylinder: 2 % wider at its corners.
+/// Number of sides of the prism that contains a cylinder; its corners extend 2 % beyond the cylinder.
 const PRISM_SIDES: usize = 16;
 
 impl CollisionShape {
@@ -68,7 +68,7 @@ impl CollisionShape {
 }
 
 impl Solid {
-    /// The solid in another frame.
+    /// Returns the solid in another frame.
     #[must_use]
     pub fn placed(&self, to_from_here: &Transform) -> Self {
         Self {

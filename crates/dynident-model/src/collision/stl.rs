@@ -1,7 +1,7 @@
 //! Triangles of a binary STL file.
 //!
-//! This is own code because only the corners are needed, and the triangle count in the header must not determine the
-//! allocated memory.
+//! This is a separate implementation, because only the corners are needed, and the triangle count in the header must
+//! not determine the allocated memory.
 
 use crate::spatial::Vec3;
 
@@ -15,7 +15,7 @@ pub(super) fn is_binary(bytes: &[u8]) -> bool {
     let Some(count) = bytes.get(80..HEADER_BYTES) else { return false };
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize;
     let needed = count.checked_mul(TRIANGLE_BYTES).and_then(|length| length.checked_add(HEADER_BYTES));
-    // Some programs append bytes.
+    // Some programs append bytes to a binary file.
     let text = bytes.starts_with(b"solid") && bytes.windows(8).take(4096).any(|window| window == b"endfacet");
     needed.is_some_and(|needed| count > 0 && bytes.len() >= needed && !text)
 }

@@ -16,7 +16,7 @@ use toml::Spanned;
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
     let stated = model_in(text, table, table.convention)?;
     let other = table.convention.other();
-    // A failure in the other convention is not an error of the table.
+    // An error in the other convention is not an error of the table.
     Ok(match model_in(text, table, other) {
         Ok(model) => stated.with_other_convention(other, model),
         Err(_) => stated,

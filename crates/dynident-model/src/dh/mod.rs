@@ -34,19 +34,20 @@
 //! # Ok::<(), dynident_model::DhError>(())
 //! ```
 //!
-//! With `s` the sign, a revolute joint has `θ = theta + s q`, a prismatic one `d = d_m + s q`.
+//! With `s` = `sign` of a row and the joint position q, a revolute joint has `θ = theta + s q`, a prismatic joint `d
+//! = d_m + s q`.
 //!
 //! | convention | frame i in frame i-1 | `a`, `alpha` of row i are |
 //! | --- | --- | --- |
-//! | `modified` (Craig 1986; Khalil and Kleinfinger 1986) | `Rx(α) Tx(a) Rz(θ) Tz(d)` | those before joint i: `a_{i-1}`, `α_{i-1}` |
-//! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | those after joint i: `a_i`, `α_i` |
+//! | `modified` (Craig 1986; Khalil and Kleinfinger 1986) | `Rx(α) Tx(a) Rz(θ) Tz(d)` | the values before joint i: `a_{i-1}`, `α_{i-1}` |
+//! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | the values after joint i: `a_i`, `α_i` |
 //!
 //! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In
 //! the standard convention the axis of joint i is z of frame i-1. There the body frame is frame i-1 rotated by `Rz(θ)`
 //! (or translated along z by `s q`), and D-H frame i in it is `Tz(d) Tx(a) Rx(α)`. Inertials in the table are always
 //! given in D-H frame i; the reader transforms them into the body frame.
 //!
-//! **Inertials** are given in one of two forms; a body without an inertial is unknown, not massless:
+//! **Inertials** are given in one of two forms. A body without an inertial has unknown mass; it is not massless:
 //! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin
 //!   of D-H frame i), both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
 //! - `parameters`, all ten in the order [`INERTIAL_NAMES`](crate::INERTIAL_NAMES).

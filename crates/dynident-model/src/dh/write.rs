@@ -1,7 +1,7 @@
 //! Writing identified values back into the user's own D-H table.
 //!
-//! Only `inertial` and the two friction values of `dynamics` change; comments, order and spacing of everything else
-//! stay.
+//! Only `inertial` and the two friction values of `dynamics` change. Everything else keeps its comments, order and
+//! spacing.
 
 use super::build::rows;
 use super::{DhError, parsed, toml_fault};
@@ -35,10 +35,10 @@ pub enum DhWriteError {
     NotFinite { kind: &'static str, name: String },
 }
 
-/// Writes the changes into `original`. Inertials, which the changes give in the **body** frames, are written in the D-H
+/// Writes the changes into `original`. The changes give inertials in the **body** frames. They are written in the D-H
 /// frames of the rows (see the [module](crate::dh)) as `mass_kg`, `com_m` and `inertia_at_com`, or as `parameters` if
-/// there is no centre of mass. Every number has the shortest form that parses to the same `f64`. Notes become comments
-/// before the row's `inertial`.
+/// there is no centre of mass. Every number has the shortest form that parses to the same `f64`. Notes become
+/// comments before the row's `inertial`.
 ///
 /// # Errors
 /// An invalid D-H table, an unknown link or joint, a repeated change, or a value that is not finite.

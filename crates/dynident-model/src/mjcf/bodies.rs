@@ -22,7 +22,7 @@ use std::collections::{HashMap, HashSet};
 
 pub(super) const WORLD: &str = "world";
 
-/// Elements of a body without influence on its dynamics.
+/// Elements of a body that do not influence its dynamics.
 const NON_DYNAMIC_ELEMENTS: [&str; 4] = ["site", "camera", "light", "plugin"];
 const IN_BODY: [&str; 14] = [
     "name",
@@ -73,7 +73,7 @@ const IN_JOINT: [&str; 25] = [
 #[derive(Clone, Debug)]
 pub(super) struct LinkPlace {
     pub(super) name: String,
-    /// The `<body>`; `None` for a link between two joints of one body, which has no element.
+    /// The `<body>` element; `None` for a link between two joints of one body, which has no element.
     pub(super) body: Option<Place>,
     /// Origin of the link's frame in the body's frame, m; the axes are the same.
     pub(super) origin: Vec3,
@@ -83,13 +83,13 @@ pub(super) struct Tree {
     pub(super) joints: Vec<Joint>,
     /// Elements of the joints, in the same order.
     pub(super) joint_places: Vec<Place>,
-    /// Positions in the drawn pose (`ref`), in the same order, rad or m.
+    /// Positions in the pose as drawn (`ref`), in the same order, rad or m.
     pub(super) references: Vec<f64>,
     pub(super) bodies: Vec<Body>,
     pub(super) base: Body,
     pub(super) links: Vec<LinkPlace>,
     pub(super) unknown: HashSet<String>,
-    /// Objects of the scene that were left out.
+    /// Objects of the scene that are not part of the robot.
     pub(super) dropped: Dropped,
 }
 
@@ -176,7 +176,7 @@ impl<'t, 'f> Reader<'t, 'f> {
         }
     }
 
-    /// Depth first, bodies in the order of the document.
+    /// Visits the bodies depth first, in the order of the document.
     pub(super) fn tree(mut self) -> Result<Tree, MjcfError> {
         let mut tree = Tree::new();
         // A stack avoids recursion, because a chain may be as long as the file.
@@ -303,7 +303,7 @@ impl<'t, 'f> Reader<'t, 'f> {
         Ok(())
     }
 
-    /// Joint at `placement` in its parent; `ref` shifts the zero position away from the drawn pose.
+    /// Joint at `placement` in its parent; `ref` is the joint position in the pose as drawn.
     fn joint(
         &mut self,
         element: JointElement,
@@ -432,7 +432,7 @@ impl<'t, 'f> Reader<'t, 'f> {
             if let Some(faulty) = contents.geoms.iter().position(Result::is_err) {
                 contents.geoms.swap_remove(faulty)?;
             }
-            // Meshes of a body that does not move are not read: its mass is in no torque.
+            // Meshes of a body that does not move are not read: its mass does not affect any torque.
             let is_needed = moves || self.compiler.total_mass.is_some();
             for geom in contents.geoms.iter().flatten() {
                 let inertial = match geom.mass {
@@ -492,7 +492,7 @@ impl<'t, 'f> Reader<'t, 'f> {
         }
     }
 
-    /// `name`, with underscores appended if it is taken.
+    /// Returns `name`, with underscores appended if it is already used.
     fn free_name(&mut self, mut name: String) -> String {
         while !self.body_names.insert(name.clone()) {
             name.push('_');

@@ -1,7 +1,7 @@
-//! `<connect>` under `<equality>`: closes chains of the parallelogram kind, as `[[robot.loop]]` of a study does.
+//! `<connect>` under `<equality>`: closes chains that are parallelograms, like `[[robot.loop]]` of a study.
 //!
-//! The two points are the anchor and the coinciding point in the drawn pose. MJCF does not mark passive joints: they
-//! are the joints of the chain without an actuator that do not follow another joint.
+//! The two points are the anchor and the point that coincides with it in the pose as drawn. MJCF does not mark
+//! passive joints: the joints of the chain that have no actuator and follow no other joint are treated as passive.
 
 use super::bodies::LinkPlace;
 use super::classes::Stated;
@@ -14,7 +14,7 @@ use crate::spatial::{Transform, Vec3};
 use crate::tree::Model;
 use std::collections::HashSet;
 
-/// Maximum number of chains; robots have few, and their sizes multiply.
+/// Maximum number of chains. Robots have few; the cost grows with the product of their sizes.
 const MAX_CHAINS: usize = 16;
 
 /// A `<connect>` that names a body and an anchor.
@@ -28,12 +28,12 @@ pub(super) struct Connect<'t> {
 pub(super) struct ChainContext<'a> {
     pub(super) document: &'a Expanded,
     pub(super) links: &'a [LinkPlace],
-    /// Positions in the drawn pose, in the order of the tree.
+    /// Positions in the pose as drawn, in the order of the tree.
     pub(super) references: &'a [f64],
     pub(super) driven: &'a HashSet<String>,
 }
 
-/// Closes the chains of a robot. Chains that are not parallelograms stay open, with a notice.
+/// Closes the chains of a robot. Chains that are not parallelograms remain open; a notice reports them.
 pub(super) fn closed(
     model: Model,
     connects: &[Connect<'_>],
@@ -81,7 +81,7 @@ fn blames(error: &LoopError, closure: &LoopClosure) -> bool {
     }
 }
 
-/// Cut of a chain, or the reason why it cannot be closed.
+/// The cut of a chain, or the reason why the chain cannot be closed.
 fn closure(model: &Model, connect: &Connect<'_>, around: &ChainContext<'_>) -> Result<LoopClosure, String> {
     let way = |link: &String| loops::path_to(model, link).ok_or_else(|| format!("unknown body `{link}`"));
     let [(first, first_placement), (second, second_placement)] = [way(&connect.bodies[0])?, way(&connect.bodies[1])?];

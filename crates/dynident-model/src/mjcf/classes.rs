@@ -5,7 +5,7 @@ use super::fault::{MjcfError, MjcfFault};
 use crate::xml::shortened;
 use std::collections::HashMap;
 
-/// All actuator elements share one set of defaults.
+/// Elements of actuators: all share one set of defaults.
 const ACTUATORS: [&str; 11] = [
     "general",
     "motor",
@@ -22,7 +22,7 @@ const ACTUATORS: [&str; 11] = [
 
 pub(super) type ClassId = usize;
 
-/// Class of elements that do not name one.
+/// Class of elements that do not name a class.
 pub(super) const MAIN: ClassId = 0;
 
 struct Class<'t> {
@@ -103,8 +103,8 @@ impl<'t> Classes<'t> {
         self.by_name.get(&*name.value).copied().map(Some).ok_or_else(unknown)
     }
 
-    /// Attributes of an element: its own, then those of its class (`class`, or `childclass` of a surrounding body),
-    /// then those of the parent classes.
+    /// Attributes of an element: first those in the element, then those of its class (`class`, or `childclass` of a
+    /// surrounding body), then those of the parent classes.
     pub(super) fn stated(
         &'t self,
         document: &'t Expanded,
@@ -145,8 +145,8 @@ impl<'t> Stated<'t> {
         self.levels.iter().flatten().find(|attribute| attribute.name == name).copied()
     }
 
-    /// Attributes among `names` from the nearest level that states any of them: a nearer orientation overrides one that
-    /// is written in another form.
+    /// Attributes among `names` from the nearest level (element or class) that has any of them. An orientation of a
+    /// nearer level overrides one in another notation.
     pub(super) fn nearest(&self, names: &[&'static str]) -> Vec<(&'static str, &'t Attribute)> {
         let of = |level: &Vec<&'t Attribute>| -> Vec<(&'static str, &'t Attribute)> {
             names

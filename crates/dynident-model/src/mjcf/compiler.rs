@@ -4,7 +4,7 @@ use super::classes::Stated;
 use super::expanded::Expanded;
 use super::fault::{MjcfError, MjcfFault};
 
-/// Which bodies get their inertia from their geoms.
+/// Selection of the bodies whose inertia is computed from their geoms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FromGeoms {
     Always,
@@ -30,12 +30,12 @@ pub(super) struct Compiler {
     pub(super) meshdir: String,
     /// Whether folders in the names of mesh files are ignored.
     pub(super) strips_path: bool,
-    /// `exactmeshinertia` of MuJoCo before 3.2.5: the mode of meshes that do not state one.
+    /// `exactmeshinertia` of MuJoCo before 3.2.5: the mode of meshes without an explicit mode.
     pub(super) exact_mesh_inertia: bool,
 }
 
 impl Compiler {
-    /// Reads all `<compiler>` sections; a later one overrides an earlier one.
+    /// Reads all `<compiler>` sections; a later section overrides an earlier one.
     pub(super) fn new(document: &Expanded) -> Result<Self, MjcfError> {
         let mut found = Self {
             degrees: true,

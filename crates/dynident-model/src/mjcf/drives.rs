@@ -33,8 +33,8 @@ pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3
     Ok(if is_on { gravity } else { Vec3::ZERO })
 }
 
-/// Effort limits of joints from their actuators: the sum of the limits of a joint's actuators, if each has a symmetric
-/// limit. A lower limit of the joint itself is kept. Returns the joints that have actuators.
+/// Effort limits of joints from their actuators: the sum of the limits of a joint's actuators, if each has a
+/// symmetric limit. A smaller limit of the joint itself is kept. Returns the joints that have actuators.
 pub(super) fn efforts(
     document: &Expanded,
     classes: &Classes<'_>,
@@ -76,7 +76,7 @@ pub(super) fn efforts(
     Ok(driven)
 }
 
-/// Force range of an actuator: its own, or that of the control of a motor, which equals the force.
+/// Force range of an actuator: `forcerange`, or the control range of a motor, whose control equals its force.
 fn force(stated: &Stated<'_>, element: &Element) -> Result<Option<[f64; 2]>, MjcfError> {
     let limited = |range: &str, limited: &str| -> Result<Option<[f64; 2]>, MjcfError> {
         let is_off = stated.flag(limited)? == Some(false);
@@ -111,7 +111,7 @@ pub(super) fn couplings<'t>(
             |key: &str, names: &HashSet<String>| element.attribute(key).is_some_and(|name| names.contains(&name.value));
         let bodies = ["body1", "body2"].map(|key| is_dropped(key, &tree.dropped.bodies));
         let joints = ["joint1", "joint2"].map(|key| is_dropped(key, &tree.dropped.joints));
-        // A constraint of an object with the robot stays: it loads the robot.
+        // A constraint between an object and the robot is kept, because it applies forces to the robot.
         let has_second = element.attribute("body2").is_some_and(|name| name.value != WORLD);
         if joints.contains(&true) || bodies == [true, true] || bodies[0] && !has_second {
             continue;

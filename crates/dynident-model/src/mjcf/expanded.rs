@@ -59,8 +59,8 @@ impl Expanded {
         let mut names = HashSet::new();
         let mut bytes = text.len();
         found.append(0, None)?;
-        // Elements precede their children in the arena, so that one pass finds every `<include>`, including those in
-        // appended files.
+        // Elements come before their children in the list, so that one pass finds every `<include>`, including those
+        // in appended files.
         let mut next = 0;
         while next < found.elements.len() {
             let mut children = 0;
@@ -156,7 +156,7 @@ impl Expanded {
         self.children(self.root()).filter(move |element| element.tag == tag)
     }
 
-    /// `fault` with line and column in the main file; for an included file, those of the `<include>`.
+    /// Returns `fault` with its line and column in the main file; for an included file, the place of the `<include>`.
     pub(super) fn fault(&self, place: Place, fault: MjcfFault) -> MjcfError {
         let source = &self.sources[place.source];
         let (line, column) = line_and_column(&source.text, place.at);

@@ -1,11 +1,11 @@
-//! Free joints: objects of a scene, which are left out, and robots with a floating base, which are read as fixed.
+//! Free joints: objects of a scene, which are not read, and robots with a floating base, which are read as fixed.
 
 use super::classes::{ClassId, Classes, Stated};
 use super::expanded::{Element, Expanded};
 use super::fault::MjcfError;
 use std::collections::HashSet;
 
-/// Attributes of an actuator or of an element in a tendon that name what they act on.
+/// Attributes of an actuator (or of an element in a tendon) that name the joint or site on which it acts.
 const TARGETS: [&str; 6] = ["joint", "jointinparent", "site", "cranksite", "slidersite", "refsite"];
 
 /// Names of joints and sites that an actuator acts on, directly or by a tendon.
@@ -28,8 +28,8 @@ impl<'t> ActuatedNames<'t> {
         Self(names)
     }
 
-    /// Whether a body with a free joint is an object: without joints below it, or with joints that no actuator moves.
-    /// In a document without actuators, every body with joints is treated as a robot.
+    /// Whether a body with a free joint is an object of the scene: it has no joints below it, or no actuator moves
+    /// them. In a document without actuators, every body with joints is treated as a robot.
     pub(super) fn is_object(&self, document: &'t Expanded, body: &'t Element) -> bool {
         let below = below(document, body);
         let is_joint = |element: &&Element| {
@@ -43,7 +43,7 @@ impl<'t> ActuatedNames<'t> {
     }
 }
 
-/// Names of a dropped object: its bodies and joints, which other sections may still name.
+/// Names of an object that is not read: its bodies and joints, which other sections can still name.
 #[derive(Default)]
 pub(super) struct Dropped {
     pub(super) bodies: HashSet<String>,
@@ -74,7 +74,7 @@ fn below<'t>(document: &'t Expanded, body: &'t Element) -> Vec<&'t Element> {
     found
 }
 
-/// The free joint of a body, also inside its `<frame>` elements; `class` is the class of the body's elements.
+/// The free joint of a body, also if it is inside a `<frame>` element; `class` is the class of the body's elements.
 pub(super) fn free_joint<'t>(
     document: &'t Expanded,
     classes: &'t Classes<'t>,

@@ -22,20 +22,20 @@ pub(super) enum GeomMass {
     Known(InertialParameters),
     /// Mass properties of a mesh, with its pose in the body's frame.
     Mesh { name: String, placement: Transform, mass: MassOrDensity },
-    /// Unknown, with the reason.
+    /// Inertial is unknown, with the reason.
     Unknown(&'static str),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MassOrDensity {
-    /// kg
+    /// Mass, kg.
     Mass(f64),
-    /// kg/m³; of a shell kg/m².
+    /// Density, kg/m³ (kg/m² for a shell).
     Density(f64),
 }
 
 impl GeomMass {
-    /// Inertial in the body's frame, `None` without mass, or the reason why it is unknown.
+    /// Inertial in the body's frame (`None` for a geom without mass), or the reason why it is unknown.
     pub(super) fn inertial(&self, meshes: &mut Meshes<'_>) -> Result<Option<InertialParameters>, String> {
         match self {
             Self::Massless => Ok(None),
@@ -98,7 +98,7 @@ pub(super) fn geom(
             let placement = body_from_frame.then(&place(stated, compiler)?);
             let file = meshes.get(name).and_then(|mesh| Some((mesh, mesh.file.clone()?)));
             let shape = match file {
-                // A mesh that is moved in its own frame cannot be placed by its file alone.
+                // The file gives the shape of a mesh only if the mesh is not moved in its own frame.
                 Some((mesh, file)) if mesh.reference == Transform::IDENTITY => collides.then_some(CollisionShape {
                     placement,
                     geometry: CollisionGeometry::Mesh { file, scale: mesh.scale },
@@ -153,7 +153,7 @@ pub(super) fn geom(
     Ok(Geom { mass: GeomMass::Known(own.expressed_in(&placement)), shape })
 }
 
-/// Pose of the geom in its frame, and its half sizes (or radius and half length, then zero).
+/// Pose of the geom in its frame, and its half sizes (or radius, half length, and zero).
 fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Transform, [f64; 3]), MjcfError> {
     let given = stated.numbers_between("size", 1, 3)?.unwrap_or_default();
     let mut size = [0.0; 3];
@@ -233,7 +233,7 @@ fn shape(solid: Solid, size: [f64; 3]) -> CollisionGeometry {
         Solid::Sphere => CollisionGeometry::Sphere { radius_m: a },
         Solid::Capsule => CollisionGeometry::Capsule { radius_m: a, length_m: 2.0 * b },
         Solid::Cylinder => CollisionGeometry::Cylinder { radius_m: a, length_m: 2.0 * b },
-        // The bounding box of an ellipsoid: collision checks are conservative.
+        // An ellipsoid is replaced by its bounding box, so that collision checks are conservative.
         Solid::Box | Solid::Ellipsoid => CollisionGeometry::Box { size_m: [2.0 * a, 2.0 * b, 2.0 * c] },
     }
 }

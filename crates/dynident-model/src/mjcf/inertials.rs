@@ -34,7 +34,7 @@ pub(super) fn inertial(
     let frame_from_inertial = place(stated, compiler)?;
     let body_from_inertial = body_from_frame.then(&frame_from_inertial);
     let r = &body_from_inertial.rotation;
-    // Without a rotation the numbers stay exact.
+    // Without a rotation the numbers are not changed by rounding.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, body_from_inertial.translation, &turned))
 }
@@ -53,7 +53,7 @@ pub(super) fn corrected(inertial: Option<InertialParameters>, compiler: &Compile
     };
     let mass = given.mass_kg().max(compiler.bound_mass);
     let com = given.com_m().unwrap_or(Vec3::ZERO);
-    // Without mass the moments are about the frame's origin, which then replaces the centre of mass.
+    // A body without mass has no centre of mass: the moments are then about the frame's origin.
     let at_com = given.inertia_at_com().unwrap_or_else(|| given.inertia_at_origin()).0;
     let eigen = Matrix3::from_fn(|a, b| at_com[a][b]).symmetric_eigen();
     let bounded: Vec<f64> = eigen.eigenvalues.iter().map(|moment| moment.max(compiler.bound_inertia)).collect();

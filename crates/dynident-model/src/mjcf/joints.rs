@@ -17,7 +17,7 @@ pub(super) struct JointElement {
     pub(super) axis: Vec3,
     /// A point on a hinge's axis; `None` for a slide.
     pub(super) anchor: Option<Vec3>,
-    /// Position in the drawn pose, rad or m.
+    /// Position in the pose as drawn, rad or m.
     pub(super) reference: f64,
     pub(super) limits: JointLimits,
     pub(super) damping: Option<f64>,

@@ -35,7 +35,7 @@ impl MeshAsset {
         };
         let [w, x, y, z] = stated.numbers("refquat")?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
         let norm = (w * w + x * x + y * y + z * z).sqrt();
-        // A quaternion without length is replaced by the identity, as in MuJoCo.
+        // A quaternion of length zero is replaced by the identity, as in MuJoCo.
         let rotation =
             if norm < 1e-15 { Mat3::IDENTITY } else { Mat3::from_quaternion([x, y, z, w].map(|part| part / norm)) };
         let reference = Transform { rotation, translation: stated.vector("refpos")?.unwrap_or(Vec3::ZERO) };
@@ -54,7 +54,7 @@ impl MeshAsset {
         Ok(Self { file, scale: stated.numbers("scale")?.unwrap_or([1.0; 3]), reference, mode, inline })
     }
 
-    /// Mesh in its frame: moved, turned, then scaled; a negative scale turns the faces.
+    /// Inertia of the mesh in its frame: moved, rotated, then scaled; a negative scale reverses the faces.
     fn inertia(&self, read: &mut ReadMesh<'_>) -> Result<MeshInertia, String> {
         let mut mesh = match &self.file {
             Some(file) => read(file)?,

@@ -1,14 +1,15 @@
 //! MJCF, MuJoCo's model format: reading and writing back.
 //!
-//! Supported are nested bodies with `<inertial>` or geoms (simple solids, meshes), and joints of type hinge and slide,
-//! on a fixed base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and
-//! `frictionloss`, effort limits of joints and actuators, and gravity. A body without joint is merged into its parent.
-//! A body whose mass depends on a missing mesh is unknown, not massless. A robot with a free joint is read as fixed;
-//! other bodies with a free joint are objects of the scene and are left out. Both give a notice.
+//! Supported are nested bodies with `<inertial>` or geoms (simple solids, meshes) and joints of type hinge and slide,
+//! on a fixed base. Also supported are `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`,
+//! `damping` and `frictionloss`, effort limits of joints and actuators, and gravity. A body without joint is merged
+//! into its parent. A body whose mass depends on a missing mesh has unknown mass; it is not massless. A robot with a
+//! free joint is read as fixed. Other bodies with a free joint are objects of the scene and are not read. Both cases
+//! give a notice.
 //!
-//! A joint's anchor may differ from the origin of its body. The frame of a link that moves with a joint has the axes of
-//! its MJCF body, and its origin at the anchor of the body's last hinge. Several joints in one body become a chain with
-//! massless bodies between them, called `BODY/JOINT`.
+//! A joint's anchor can differ from the origin of its body. The frame of a link that moves with a joint has the axes
+//! of its MJCF body, and its origin is the anchor of the body's last hinge. Several joints in one body become a chain
+//! with massless bodies between them, called `BODY/JOINT`.
 //!
 //! ```
 //! let text = r#"<mujoco model="pendulum"><compiler angle="radian"/>

@@ -12,7 +12,7 @@ pub struct MjcfNotice {
     pub file: Option<String>,
     /// Line, from 1.
     pub line: u32,
-    /// The part.
+    /// The part of the document that is not represented, and its consequence.
     pub loss: MjcfLoss,
 }
 

@@ -8,7 +8,7 @@ use crate::spatial::{Mat3, Transform, Vec3};
 /// Attributes of an orientation; an element may have only one of them.
 pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
-/// Rotation that an element states, if any.
+/// Rotation that the attributes of an element define, if any.
 pub(super) fn orientation(stated: &Stated<'_>, compiler: &Compiler) -> Result<Option<Mat3>, MjcfError> {
     let (name, attribute) = match stated.nearest(&ORIENTATIONS)[..] {
         [] => return Ok(None),

@@ -12,7 +12,7 @@ impl Stated<'_> {
         self.document.fault(self.place, fault)
     }
 
-    /// All numbers of an attribute; any magnitude, because limits such as `1e16` mean "unlimited".
+    /// All numbers of an attribute. Any magnitude is accepted, because limits such as `1e16` mean "unlimited".
     fn list(&self, attribute: &Attribute) -> Result<Vec<f64>, MjcfError> {
         let number =
             |word: &str| parse_number(word).map_err(|(what, fix)| self.number_fault(attribute, word, what, fix));
@@ -30,7 +30,7 @@ impl Stated<'_> {
         self.document.fault(attribute.place, fault)
     }
 
-    /// Between `least` and `most` numbers, each within the magnitude limit.
+    /// Reads between `least` and `most` numbers, each within the magnitude limit.
     pub(super) fn numbers_between(&self, name: &str, least: usize, most: usize) -> Result<Option<Vec<f64>>, MjcfError> {
         let Some(numbers) = self.numbers_of_any_size(name, least, most)? else { return Ok(None) };
         let Some(attribute) = self.get(name) else { return Ok(None) };
@@ -41,7 +41,7 @@ impl Stated<'_> {
         Ok(Some(numbers))
     }
 
-    /// Between `least` and `most` numbers of any magnitude.
+    /// Reads between `least` and `most` numbers of any magnitude.
     pub(super) fn numbers_of_any_size(
         &self,
         name: &str,
@@ -78,7 +78,7 @@ impl Stated<'_> {
         Ok(self.numbers::<1>(name)?.map(|[number]| number))
     }
 
-    /// A nonnegative number.
+    /// Reads a nonnegative number.
     pub(super) fn size(&self, name: &'static str) -> Result<Option<f64>, MjcfError> {
         let number = self.number(name)?;
         match (number, self.get(name)) {
@@ -106,11 +106,11 @@ impl Stated<'_> {
         if norm < 1e-9 {
             return Err(MjcfFault::NoDirection { element: self.tag.to_owned(), attribute });
         }
-        // A division could change vectors that are already exact.
+        // A division could change vectors whose length is already exactly one.
         Ok(if norm == 1.0 { vector } else { Vec3(vector.0.map(|x| x / norm)) })
     }
 
-    /// `true` or `false`; `None` for `auto` and for a missing attribute.
+    /// Reads `true` or `false`; `None` for `auto` and for a missing attribute.
     pub(super) fn flag(&self, name: &str) -> Result<Option<bool>, MjcfError> {
         match self.word(name, &["true", "false", "auto"], "true, false or auto")? {
             Some("true") => Ok(Some(true)),

@@ -1,8 +1,8 @@
 //! Writes identified values into an existing MJCF.
 //!
-//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; all other bytes stay,
-//! except invisible characters, which become character references ([`dynident_text::xml::document`]). A body fixed to a
-//! moving body gets a massless `<inertial>`, because without one MuJoCo computes its mass from its geoms.
+//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change. All other bytes are
+//! kept, except invisible characters, which become character references ([`dynident_text::xml::document`]). A body
+//! fixed to a moving body gets a massless `<inertial>`, because otherwise MuJoCo computes its mass from its geoms.
 
 use super::bodies::LinkPlace;
 use super::compiler::FromGeoms;
@@ -62,9 +62,10 @@ pub enum MjcfWriteError {
     Compiler { setting: &'static str, fix: &'static str },
 }
 
-/// Writes the changes into `original` and keeps all other bytes. Inertials, given in the links' frames as by
-/// [`read_mjcf`](super::read_mjcf), are written about the centre of mass in the axes of the `<body>`. Every number has
-/// the shortest form that parses to the same `f64`. `include` as in [`read_mjcf_with`](super::read_mjcf_with).
+/// Writes the changes into `original` and keeps all other bytes. The changes give inertials in the links' frames as
+/// in [`read_mjcf`](super::read_mjcf). They are written about the centre of mass in the axes of the `<body>`. Every
+/// number has the shortest form that parses to the same `f64`. `include` is used as in
+/// [`read_mjcf_with`](super::read_mjcf_with).
 ///
 /// # Errors
 /// An invalid MJCF; a body or joint that is unknown, repeated or in an included file; or values that MuJoCo would
@@ -79,7 +80,7 @@ pub fn rewrite_mjcf(
     // The masses of the original are replaced.
     let found = read(&document, &mut |_: &str| Err(String::new()))?;
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    // Cannot fail: the same text has just been parsed.
+    // This cannot fail, because the same text has just been parsed.
     let Ok(parsed) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
     let nodes: HashMap<usize, Node<'_, '_>> =
         parsed.descendants().filter(Node::is_element).map(|node| (node.range().start, node)).collect();
@@ -136,11 +137,11 @@ pub fn rewrite_mjcf(
     Ok(edited(original, edits))
 }
 
-/// New inertial of a link with a note; `None` for a link without mass.
+/// New inertial of a link with a note; the outer `None` is a link without mass.
 type Change<'c> = Option<(InertialParameters, Option<&'c str>)>;
 
-/// The changes and their consequences: a mesh body fixed to a changed body becomes massless, because its mass is
-/// included in that body.
+/// The requested changes and further changes that they require: a mesh body that is fixed to a changed body becomes
+/// massless, because the changed body includes its mass.
 fn all_changes<'c>(found: &'c Found, links: &'c [LinkChange]) -> Vec<(&'c str, Change<'c>)> {
     let mut all: Vec<(&str, Change<'_>)> = Vec::new();
     for change in links {

@@ -17,20 +17,22 @@ pub struct ServoChange {
     pub stiffness: f64,
     /// Largest torque, Nm (N); `None` without limit.
     pub torque_limit: Option<f64>,
-    /// Time from a command to its effect, s; zero without delay.
+    /// Time from a command to its effect, s; zero means no delay.
     pub delay_s: f64,
 }
 
-/// Shortest time step of a simulation for which the delay is complete, s: MuJoCo keeps one command for each step.
+/// Shortest time step of a simulation in which the complete delay is represented, s: MuJoCo keeps one command for
+/// each step.
 const DELAY_STEP_S: f64 = 0.000_25;
 
-/// Constraint of a joint's friction that hardly creeps: MuJoCo's largest impedance. With its default a joint at rest
-/// moves by some milliradians a second, and faster with little armature.
+/// Constraint parameters with which a joint's friction hardly creeps: MuJoCo's largest impedance. With MuJoCo's
+/// default, a joint at rest moves by some milliradians per second, and faster if its armature is small.
 const STIFF_FRICTION: [(&str, &str); 2] =
     [("solreffriction", "0.005 1"), ("solimpfriction", "0.9999 0.9999 0.001 0.5 2")];
 
-/// Writes gain, torque limit and delay into the `position` actuators of `original`, and adds one for each joint
-/// without. The damping belongs to the joint, whose friction becomes stiff. All other bytes stay.
+/// Writes gain, torque limit and delay into the `position` actuators of `original`, and adds an actuator for each
+/// joint without one. The damping is written to the joint, whose friction constraint becomes stiff. All other bytes
+/// are kept.
 ///
 /// # Errors
 /// Text that is not XML, or a value that is not a number.
@@ -79,7 +81,7 @@ pub fn rewrite_servos(original: &str, servos: &[ServoChange]) -> Result<String, 
     Ok(edited(original, edits))
 }
 
-/// Attributes of the actuator; one without value is removed.
+/// Attributes of the actuator; an attribute without a value is removed.
 fn attributes(servo: &ServoChange) -> Vec<(&'static str, Option<String>)> {
     let samples = (servo.delay_s / DELAY_STEP_S).ceil().max(1.0);
     let is_late = servo.delay_s > 0.0;

@@ -77,7 +77,7 @@ fn direction(joint: &Item<'_, '_>, node: Node<'_, '_>, version: Version, frames:
     let frame = if version >= Version([1, 7]) {
         xyz.and_then(|xyz| xyz.attribute("expressed_in")).filter(|frame| !frame.is_empty())
     } else {
-        // Before version 1.5 axes are in the model's frame; in 1.5 and 1.6, if the joint requests it.
+        // Before version 1.5 axes are in the model's frame; in versions 1.5 and 1.6 only if the joint requests it.
         let is_models = version < Version([1, 5]) || flag(node, "use_parent_model_frame") == Some(true);
         is_models.then_some(MODEL)
     };

@@ -10,7 +10,7 @@ use crate::spatial::{Mat3, Transform};
 use crate::xml::shortened;
 use roxmltree::Node;
 
-/// Inertial of a link in the link's frame; `None` if it is not stated.
+/// Inertial of a link in the link's frame; `None` if the file does not contain it.
 pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Option<InertialParameters>, SdfError> {
     if flag(link.node, "gravity") == Some(false) {
         notices.note(link.node, SdfLoss::Weightless { link: link.name.clone() });
@@ -19,7 +19,7 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
         notices.note(node, SdfLoss::UnknownMass { link: link.name.clone(), why });
         Ok(None)
     };
-    // A link that is only a frame has no inertial either.
+    // A link that serves only as a frame has no inertial either.
     let Some(node) = child(link.node, "inertial") else {
         return unknown(link.node, "is not stated (SDF default: 1 kg)");
     };
@@ -46,7 +46,7 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
     };
     let link_from_inertial = placement(node)?;
     let r = &link_from_inertial.rotation;
-    // Without a rotation the numbers stay exact.
+    // Without a rotation the numbers are not changed by rounding.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(Some(InertialParameters::from_centre_of_mass(mass, link_from_inertial.translation, &turned)))
 }
@@ -67,7 +67,7 @@ fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, SdfError> {
     let [radius, length] = [number(form, "radius")?, number(form, "length")?];
     let name = form.tag_name().name();
     let geometry = match name {
-        // Not shapes of a link.
+        // These geometries are not shapes of a link.
         "plane" | "heightmap" | "empty" => return Ok(None),
         "box" => numbers::<3>(form, "size")?.map(|size| CollisionGeometry::Box { size_m: size.map(f64::abs) }),
         "sphere" => radius.map(|radius| CollisionGeometry::Sphere { radius_m: radius.abs() }),

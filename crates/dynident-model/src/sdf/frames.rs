@@ -16,7 +16,7 @@ impl Frames {
     pub(super) fn new(found: &Scopes<'_, '_>) -> Result<Self, SdfError> {
         let mut model_from = HashMap::from([(String::new(), Transform::IDENTITY)]);
         for start in 0..found.items.len() {
-            // Follows the chain from this frame to one with a known pose, then back.
+            // Follows the chain from this frame to a frame with a known pose, then goes back along it.
             let mut chain: Vec<usize> = Vec::new();
             let mut is_on_chain = vec![false; found.items.len()];
             let mut at = start;
@@ -56,7 +56,8 @@ pub(super) enum Carrier {
     Link(usize),
 }
 
-/// The carrier of a frame by full name; `None` for a name that cannot be resolved.
+/// The link or world to which a frame is attached, by the frame's full name; `None` for a name that cannot be
+/// resolved.
 pub(super) fn carrier(found: &Scopes<'_, '_>, name: &str) -> Option<Carrier> {
     let mut name = name.to_owned();
     // No chain of frames is longer than the number of frames.
@@ -82,7 +83,7 @@ pub(super) fn carrier(found: &Scopes<'_, '_>, name: &str) -> Option<Carrier> {
     None
 }
 
-/// Canonical link of a model: the one that it names, or its first.
+/// Canonical link of a model: the link that the model names, or its first link.
 fn canonical_link(found: &Scopes<'_, '_>, model: Node<'_, '_>, inner: &str) -> Option<String> {
     if let Some(link) = model.attribute("canonical_link").filter(|link| !link.is_empty()) {
         return Some(full_name(inner, link));

@@ -1,13 +1,13 @@
 //! SDF, the format of Gazebo: reading, and writing identified values back.
 //!
-//! Supported is one model (in `<sdf>` or in its one `<world>`) with nested models: links with `<inertial>`, joints of
-//! type revolute, continuous, prismatic and fixed, poses and axes relative to any link, joint, frame or nested model,
-//! `<world>`'s gravity. The frame semantics of files before version 1.7 are also supported. Links connected by fixed
-//! joints are merged into one body.
+//! Supported is one model (in `<sdf>` or in its single `<world>`) with nested models: links with `<inertial>`, joints
+//! of type revolute, continuous, prismatic and fixed, poses and axes relative to any link, joint, frame or nested
+//! model, and gravity of the `<world>`. The frame semantics of files before version 1.7 are also supported. Links
+//! connected by fixed joints are merged into one body.
 //!
-//! A joint's frame may differ from that of its child. The frame of a link that moves with a joint has the axes of the
-//! SDF link, and its origin at the joint. The base has the frame of the model, and gravity is rotated into it by the
-//! model's pose. A link without `<inertial>` is unknown (SDF's default is 1 kg).
+//! A joint's frame can differ from the frame of its child link. The frame of a link that moves with a joint has the
+//! axes of the SDF link, and its origin is at the joint. The base has the frame of the model; gravity is rotated into
+//! it by the model's pose. The mass of a link without `<inertial>` is unknown (SDF's default is 1 kg).
 //!
 //! Source: the specification at <http://sdformat.org/spec> and its page on the semantics of poses.
 //!
@@ -113,7 +113,7 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     Ok(SdfRobot { model, notices: notices.list })
 }
 
-/// The only model, and its parent: the document or its world.
+/// The only model, and its parent element: the document or its world.
 fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Node<'a, 'input>), SdfError> {
     let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
     let around = match worlds[..] {

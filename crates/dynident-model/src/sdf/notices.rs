@@ -9,7 +9,7 @@ use thiserror::Error;
 pub struct SdfNotice {
     /// Line, from 1.
     pub line: u32,
-    /// Kind of the part.
+    /// The part of the document that is not represented, and its consequence.
     pub loss: SdfLoss,
 }
 

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 
 pub(super) const MODEL: &str = "__model__";
 pub(super) const WORLD: &str = "world";
-/// Maximum number of links, joints, frames and nested models: some steps are quadratic in it.
+/// Maximum number of links, joints, frames and nested models. The limit is necessary because the cost of some steps
+/// is quadratic in it.
 const MAX_ITEMS: usize = 5000;
 const MAX_NESTING: usize = 20;
 
@@ -27,7 +28,7 @@ pub(super) struct Item<'a, 'input> {
     pub(super) name: String,
     /// Names of the surrounding models, each followed by `::`.
     pub(super) scope: String,
-    /// Full name of the frame that its pose is relative to; empty for the outermost model.
+    /// Full name of the frame to which the pose of the item is relative; empty for the outermost model.
     pub(super) relative_to: String,
 }
 
@@ -52,7 +53,8 @@ pub(super) fn full_name(scope: &str, name: &str) -> String {
 
 pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> Result<Scopes<'a, 'input>, SdfError> {
     let mut found = Scopes { version, model, items: Vec::new(), by_name: HashMap::new() };
-    // Models to be visited, innermost last, so that a nested model is visited before its successors.
+    // Models to be visited. The innermost model is last, so that a nested model is visited before the models after
+    // it.
     let mut ahead = vec![(model, String::new(), 0)];
     while let Some((model, scope, depth)) = ahead.pop() {
         if depth > MAX_NESTING {
@@ -85,9 +87,9 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
     Ok(found)
 }
 
-/// Frame that the pose of an element is relative to, as named in its scope.
+/// Frame to which the pose of an element is relative, by its name in the scope of the element.
 fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&'a str, SdfError> {
-    // Before version 1.7, poses of links are relative to the model and those of joints to their child.
+    // Before version 1.7, poses of links are relative to the model, and poses of joints relative to their child.
     let stated = child(node, "pose").and_then(|pose| pose.attribute("relative_to")).filter(|frame| !frame.is_empty());
     if let Some(stated) = stated.filter(|_| version >= Version([1, 7])) {
         return Ok(stated);
@@ -105,7 +107,7 @@ fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&
     })
 }
 
-/// Notes models in other files, which are not read.
+/// Adds a notice for each model in another file; these models are not read.
 pub(super) fn note_includes(model: Node<'_, '_>, notices: &mut Notices) {
     for include in model.descendants().filter(|node| node.has_tag_name("include")) {
         let uri = children(include, "uri").next().map_or("", text).to_owned();

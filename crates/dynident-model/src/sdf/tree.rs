@@ -75,7 +75,7 @@ impl Carriers {
         Ok(Self { carried_by, under })
     }
 
-    /// The link that carries all others; `None` if it is the world.
+    /// The link that carries all other links; `None` if the world carries them.
     fn root(&self, found: &Scopes<'_, '_>, links: &[usize]) -> Result<Option<usize>, SdfError> {
         let mut roots = links.iter().copied().filter(|link| !self.carried_by.contains_key(link));
         match (self.under.contains_key(&Carrier::World), roots.next(), roots.next()) {
@@ -119,7 +119,7 @@ struct PendingJoint {
 impl Walk<'_, '_, '_> {
     fn walked(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
         let base = match root {
-            // The base's own link has the frame of the model, to which it is fixed. The inertial of a fixed link may be
+            // The base link has the frame of the model, to which it is fixed. The inertial of a fixed link can be
             // unknown.
             Some(root) => self.link(root, Transform::IDENTITY, self.model_from_link(root), &mut Notices::default())?,
             None => {
@@ -191,7 +191,7 @@ impl Walk<'_, '_, '_> {
         notices: &mut Notices,
     ) -> Result<BodyPlace, SdfError> {
         let placement = parent.model_from_body.inverse().then(&self.model_from_link(child));
-        // The inertial of a fixed link may be unknown.
+        // The inertial of a fixed link can be unknown, without a notice.
         let mut unheard = Notices::default();
         let (body, notices) = match parent.body {
             Some(body) => (&mut tree.bodies[body], notices),
@@ -205,8 +205,8 @@ impl Walk<'_, '_, '_> {
         self.frames.of(&self.found.items[index].name).unwrap_or(Transform::IDENTITY)
     }
 
-    /// A link of a body. `shift` moves its shapes and its inertial to the frame of the joint; only the first link of a
-    /// body is shifted.
+    /// Creates a link of a body. `shift` moves its shapes and its inertial to the frame of the joint; only the first
+    /// link of a body is shifted.
     fn link(
         &self,
         index: usize,
@@ -220,7 +220,7 @@ impl Walk<'_, '_, '_> {
             shape.placement = shift.then(&shape.placement);
         }
         let stays = shift == Transform::IDENTITY;
-        // Without a shift the numbers stay exact.
+        // Without a shift the numbers are not changed by rounding.
         let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };
         let inertial = inertial(item, notices)?.map(shifted);
         Ok(Link { name: item.name.clone(), placement: body_from_link, inertial, collision })

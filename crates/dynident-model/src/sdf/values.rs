@@ -32,7 +32,7 @@ pub(super) fn word_of<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result
     found.ok_or_else(|| fault_at(node, SdfFault::Missing { element: tag(node), kind: "attribute", name: attribute }))
 }
 
-/// Numbers of any magnitude, including `inf`.
+/// Reads numbers of any magnitude, including `inf`.
 fn list(node: Node<'_, '_>) -> Result<Vec<f64>, SdfError> {
     let number = |word: &str| match word.trim_start_matches('+').to_ascii_lowercase().as_str() {
         "inf" | "infinity" => Ok(f64::INFINITY),
@@ -44,7 +44,7 @@ fn list(node: Node<'_, '_>) -> Result<Vec<f64>, SdfError> {
     text(node).split_ascii_whitespace().map(number).collect()
 }
 
-/// `N` numbers, each within the magnitude limit.
+/// Reads `N` numbers, each within the magnitude limit.
 pub(super) fn numbers_in<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N], SdfError> {
     let found = list(node)?;
     if found.len() != N {
@@ -83,7 +83,7 @@ pub(super) fn flag(node: Node<'_, '_>, element: &str) -> Option<bool> {
     child(node, element).map(|node| matches!(text(node), "true" | "1"))
 }
 
-/// Pose of an element from its `<pose>`; the identity without one.
+/// Pose of an element from its `<pose>`; the identity if it has none.
 pub(super) fn placement(node: Node<'_, '_>) -> Result<Transform, SdfError> {
     let Some(pose) = child(node, "pose") else { return Ok(Transform::IDENTITY) };
     // An empty pose is treated as missing.

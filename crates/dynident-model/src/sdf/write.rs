@@ -1,8 +1,8 @@
 //! Writes identified values into an existing SDF.
 //!
-//! Only `<pose>`, `<mass>` and `<inertia>` in `<inertial>` of links and `<damping>` and `<friction>` of joints change;
-//! all other bytes stay. A link that is fixed to another keeps its inertial, because SDF's default is 1 kg; the link
-//! that carries it gets the remaining part.
+//! Only `<pose>`, `<mass>` and `<inertia>` in `<inertial>` of links and `<damping>` and `<friction>` of joints
+//! change; all other bytes are kept. A link that is fixed to another link keeps its inertial, because SDF's default
+//! is 1 kg. The link that carries it gets the remaining part of the identified inertial.
 
 use super::fault::SdfError;
 use super::frames::{Carrier, Frames, carrier};
@@ -50,9 +50,9 @@ pub enum SdfWriteError {
     NotPhysical { link: String },
 }
 
-/// Writes the changes into `original` and keeps all other bytes. Inertials, given in the links' frames as by
-/// [`read_sdf`], are written about the centre of mass in the axes of the `<link>`. Every number has the shortest form
-/// that parses to the same `f64`. Drive inertia is ignored, because SDF has no element for it.
+/// Writes the changes into `original` and keeps all other bytes. The changes give inertials in the links' frames as
+/// in [`read_sdf`]. They are written about the centre of mass in the axes of the `<link>`. Every number has the
+/// shortest form that parses to the same `f64`. Drive inertia is ignored, because SDF has no element for it.
 ///
 /// # Errors
 /// An invalid SDF; an unknown or repeated link or joint; a removed inertial; or a link without physically consistent
@@ -60,7 +60,7 @@ pub enum SdfWriteError {
 pub fn rewrite_sdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, SdfWriteError> {
     read_sdf(original)?;
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    // Cannot fail: the same text has just been parsed.
+    // This cannot fail, because the same text has just been parsed.
     let Ok(document) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
     let root = document.root_element();
     let (_, model) = model_of(root)?;
@@ -100,7 +100,7 @@ fn named(found: &Scopes<'_, '_>, name: &str, kind: Kind, word: &'static str) -> 
     index.ok_or_else(|| SdfWriteError::Unknown { kind: word, name: name.to_owned() })
 }
 
-/// Origin of the reader's link frame in the SDF link: the joint that moves it.
+/// Origin of the link frame that the reader uses, in the SDF link: the position of the joint that moves the link.
 fn moved_origin(found: &Scopes<'_, '_>, frames: &Frames, link: usize) -> Result<Vec3, SdfError> {
     let place = |name: &str| frames.of(name).unwrap_or(Transform::IDENTITY);
     for joint in found.items.iter().filter(|item| item.kind == Kind::Joint) {
@@ -114,7 +114,7 @@ fn moved_origin(found: &Scopes<'_, '_>, frames: &Frames, link: usize) -> Result<
     Ok(Vec3::ZERO)
 }
 
-/// Writes the link's `<inertial>`; other elements of the old one are kept.
+/// Writes the link's `<inertial>`; its other elements are kept.
 fn write_inertial(
     source: &Source<'_>,
     node: Node<'_, '_>,

@@ -1,4 +1,4 @@
-//! Candidate laws for the friction selection from recordings.
+//! Candidate friction laws: the friction selection tries them on recordings.
 
 use super::{CoulombShape, TorqueTerm};
 
@@ -9,11 +9,12 @@ pub struct CandidateLaw {
     pub name: &'static str,
     /// Number of constants that are selected on the grid; they are included in the number of parameters.
     pub constants: usize,
-    /// When the law is tried.
+    /// Role of the law in the search.
     pub role: CandidateRole,
-    /// Whether it is the Coulomb step, whose width is selected again with every further term.
+    /// Whether the law is Coulomb friction. The width of its smoothed sign function is selected again with every
+    /// further term.
     pub is_step: bool,
-    /// Whether only rows near zero velocity distinguish it from other friction.
+    /// Whether only rows near zero velocity distinguish the law from other friction.
     pub is_near_rest: bool,
     /// Terms of the law for each grid point of its constants.
     pub grid: fn(&CandidateJoint) -> Vec<GridPoint>,
@@ -28,18 +29,18 @@ impl CandidateLaw {
         Self { name, constants: 0, role, is_step: false, is_near_rest: false, grid }
     }
 
-    /// The law that it replaces.
+    /// The law that this law replaces.
     pub fn replaces(&self) -> Option<&'static Self> {
         let CandidateRole::InPlaceOf(replaced) = self.role else { return None };
         TorqueTerm::candidates().find(|law| law.name == replaced)
     }
 
-    /// True for the Coulomb step that is the same in both directions.
+    /// True for Coulomb friction that is the same in both directions.
     pub fn is_common_step(&self) -> bool {
         self.is_step && self.replaces().is_none()
     }
 
-    /// Position in the order of laws: a replacement follows the law that it replaces.
+    /// Position in the order of laws: a replacement comes after the law that it replaces.
     pub fn rank(&self) -> (Option<usize>, bool) {
         let replaced = self.replaces();
         let name = replaced.map_or(self.name, |law| law.name);
@@ -55,25 +56,25 @@ impl PartialEq for CandidateLaw {
 
 impl Eq for CandidateLaw {}
 
-/// When a candidate is tried.
+/// Role of a candidate law in a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CandidateRole {
     /// Part of every start model of a search.
     Base,
-    /// Together with the base, a start model of a search.
+    /// Together with the base laws, a start model of a search.
     Start,
-    /// Replaces the candidate of this name.
+    /// Replaces the candidate with this name.
     InPlaceOf(&'static str),
-    /// Added to all others, and dropped if it is not significant.
+    /// Added to all other laws, and dropped if it is not significant.
     Addition,
 }
 
-/// A grid point.
+/// One point of a candidate's grid of constants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridPoint {
     /// Terms of the point: one, or one for each direction.
     pub terms: Vec<TorqueTerm>,
-    /// Index on the first axis of the grid, ascending; `None` for a point that is tried alone.
+    /// Index on the first axis of the grid, ascending; `None` for a point that does not belong to the grid.
     pub step: Option<usize>,
 }
 
@@ -82,7 +83,7 @@ impl GridPoint {
         Self { terms: vec![term], step: None }
     }
 
-    /// A term at index `step`.
+    /// Grid point with one term at index `step`.
     pub(super) fn at(step: usize, term: TorqueTerm) -> Self {
         Self { terms: vec![term], step: Some(step) }
     }
@@ -97,23 +98,23 @@ pub struct CandidateJoint {
     pub velocity: f64,
     /// Position of this joint that corresponds to 1 rad (m) of a typical arm.
     pub position: f64,
-    /// Coulomb steps that are tried alone.
+    /// Shapes of Coulomb friction that are tested separately, outside the grid.
     pub alone: Vec<CoulombShape>,
-    /// Grid of widths of the Coulomb step, rad/s (m/s), ascending.
+    /// Grid of widths of the smoothed sign function of Coulomb friction, rad/s (m/s), ascending.
     pub widths: Vec<f64>,
-    /// Width of the Coulomb step that a law shares with the joint, rad/s (m/s).
+    /// Width of the smoothed sign function that a law shares with the joint's Coulomb friction, rad/s (m/s).
     pub width: f64,
 }
 
 /// Bounds of the velocity constants, rad/s (m/s) of a typical arm.
 const VELOCITY_BOUNDS: [f64; 2] = [1.0e-4, 10.0];
 
-/// The constant with this logarithm, clamped to its bounds.
+/// The constant that has this logarithm, clamped to its bounds.
 pub(super) fn clamped_exp(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
     logarithm.clamp(least.ln(), most.ln()).exp()
 }
 
-/// The velocity with this logarithm, clamped; `velocity` corresponds to 1 rad/s (m/s) of a typical arm.
+/// The velocity that has this logarithm, clamped; `velocity` corresponds to 1 rad/s (m/s) of a typical arm.
 pub(super) fn clamped_velocity(logarithm: f64, velocity: f64) -> f64 {
     clamped_exp(logarithm, VELOCITY_BOUNDS.map(|usual| usual * velocity))
 }

@@ -1,21 +1,22 @@
-//! Which torque terms a form of the model can hold.
+//! Classes of torque terms that the formats of exported models can represent.
 
 use super::{Coulomb, CoulombShape, DriveInertia, JointProperty, TorqueTerm, Viscous};
 use crate::Model;
 use serde::{Deserialize, Serialize};
 
-/// A class of torque terms.
+/// A class of torque terms, with the formats that represent it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TermClass {
     /// `d q̇ + c sign(q̇)` for each joint: URDF and SDF.
     DampingAndFriction,
-    /// The same with the drive inertia and the spring of each joint: MJCF.
+    /// Damping and friction as above, drive inertia and the spring of each joint: MJCF.
     DampingFrictionAndInertia,
-    /// All terms that are functions of the current position, velocity and acceleration, with smooth steps: code.
+    /// All terms that are functions of the current position, velocity and acceleration, with smoothed sign functions:
+    /// exported code.
     FunctionsOfMotion,
-    /// The same and friction with memory: the function with state in code.
+    /// All terms of the previous class and friction with hysteresis: exported functions with state.
     WithState,
 }
 
@@ -24,14 +25,16 @@ impl TermClass {
     pub const ALL: [Self; 4] =
         [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion, Self::WithState];
 
-    /// Least width of the steps of the code classes, rad/s or m/s of a typical arm
-    /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)). A sign and a narrower step get this
-    /// width, so that equal joints have equal steps and no code switches at a velocity of zero.
+    /// Minimum width of smoothed sign functions in exported code, rad/s or m/s of a typical arm
+    /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)). An unsmoothed sign function or a
+    /// narrower one gets this width. So equal joints have equal functions, and no code is discontinuous at zero
+    /// velocity.
     pub const CODE_STEP_WIDTH: f64 = 0.002;
 
-    /// Terms of joint `joint` that a format of this class can contain, chosen to replace its terms in `terms` (all
-    /// terms of the robot) except its spring. If the class contains all of them, there is one list. Otherwise each list
-    /// is an alternative, and the caller should fit all and take the one with the smallest residual.
+    /// Terms of joint `joint` that a format of this class can represent. They replace the joint's terms in `terms`
+    /// (all terms of the robot), except its spring. If the class can represent all of them, there is one list.
+    /// Otherwise each list is an alternative: the caller should fit all of them and use the one with the smallest
+    /// residual.
     pub fn terms_of_joint(self, model: &Model, terms: &[TorqueTerm], joint: usize) -> Vec<Vec<TorqueTerm>> {
         let is_own = move |term: &&TorqueTerm| {
             term.own_joint() == Some(joint) && term.property() != Some(JointProperty::Stiffness)
@@ -65,8 +68,8 @@ impl TermClass {
         }
     }
 
-    /// Whether a form of this class holds a friction term of one joint without a loss. A smooth step of any width is
-    /// treated as the step of URDF and MJCF.
+    /// Whether a format of this class represents a friction term of one joint without loss. A smoothed sign function
+    /// of any width is treated as equal to the friction of URDF and MJCF.
     pub fn holds_friction(self, term: &TorqueTerm) -> bool {
         match self {
             Self::DampingAndFriction | Self::DampingFrictionAndInertia => {
@@ -77,7 +80,7 @@ impl TermClass {
         }
     }
 
-    /// The term as forms of this class contain it: in code with a smooth step of at least
+    /// The term as formats of this class represent it: in code with a smoothed sign function whose width is at least
     /// [`CODE_STEP_WIDTH`](Self::CODE_STEP_WIDTH).
     #[must_use]
     pub fn in_form(self, model: &Model, term: &TorqueTerm) -> TorqueTerm {
@@ -94,7 +97,7 @@ impl TermClass {
         }
     }
 
-    /// Whether the class can hold a coupling of two joints or a spring, with its value.
+    /// Whether a format of this class can represent a coupling of two joints, or a spring, with its value.
     pub fn holds(self, term: &TorqueTerm) -> bool {
         let is_spring = term.property() == Some(JointProperty::Stiffness);
         match self {
@@ -105,9 +108,9 @@ impl TermClass {
     }
 }
 
-/// The terms that replace those of a joint whose friction with memory is left out: such friction is Coulomb friction
-/// until the joint reverses, and its presliding resembles viscous friction. `kept` are the other terms; Coulomb terms
-/// get steps of this width.
+/// The terms that replace the terms of a joint whose hysteresis friction cannot be represented. Such friction equals
+/// Coulomb friction until the joint reverses, and resembles viscous friction directly after a reversal. `kept`
+/// contains the other terms; Coulomb terms get smoothed sign functions of this width.
 fn without_memory(kept: &[TorqueTerm], joint: usize, width: Option<f64>) -> Vec<TorqueTerm> {
     let shape = |step| width.map_or(step, |width| CoulombShape::Smooth { width });
     let one = |term: &TorqueTerm| if is_coulomb(term) { term.clone().with_step(shape) } else { term.clone() };
@@ -125,5 +128,6 @@ fn is_coulomb(term: &TorqueTerm) -> bool {
     matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_))
 }
 
-/// Candidate widths of the smooth step that replaces friction with memory, rad/s or m/s of a usual arm.
+/// Candidate widths of the smoothed sign function that replaces hysteresis friction, rad/s or m/s of an arm of usual
+/// size.
 const STEP_WIDTHS: [f64; 4] = [0.005, 0.02, 0.05, 0.1];

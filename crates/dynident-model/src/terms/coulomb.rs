@@ -1,4 +1,4 @@
-//! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
+//! Coulomb friction: `τ = F_c s(q̇)`, where `s` is the sign function or a smoothed sign function.
 
 use super::TorqueTerm;
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
@@ -10,41 +10,41 @@ use super::law::{Law, VelocityLaw};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// The step near zero velocity.
+/// The function `s` of Coulomb friction: how the friction changes its sign near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombShape {
-    /// `sign(q̇)`, and zero while `|q̇|` is at most `dead_band` (rad/s or m/s; may be zero).
+    /// Sign function: `sign(q̇)`, and zero while `|q̇|` is at most `dead_band` (rad/s or m/s; can be zero).
     Sign {
         /// Half width of the band without friction torque.
         dead_band: f64,
     },
-    /// `tanh(q̇ / width)`, which avoids chatter caused by velocity noise near rest.
+    /// Smoothed sign function: `tanh(q̇ / width)`, which avoids chatter due to velocity noise near rest.
     Smooth {
-        /// Velocity at which 76 % of the step is reached, rad/s or m/s, positive.
+        /// Velocity at which the function has reached 76 % of its final value, rad/s or m/s, positive.
         width: f64,
     },
 }
 
 impl CoulombShape {
-    /// Default width of a smooth step, rad/s or m/s of a typical arm
+    /// Default width of a smoothed sign function, rad/s or m/s of a typical arm
     /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)).
     pub const USUAL_WIDTH: f64 = 0.02;
 
-    /// Value of the step at velocity `dq`.
+    /// Value of the function at velocity `dq`.
     #[inline]
     pub fn step(self, dq: f64) -> f64 {
         self.of(dq)
     }
 
-    /// Derivative of the step with respect to velocity; zero for the sign.
+    /// Derivative with respect to velocity; zero for the unsmoothed sign function.
     #[inline]
     pub fn slope(self, dq: f64) -> f64 {
         VelocityFunction::slope(&self, dq)
     }
 
-    /// Friction curve of a robot. The dead band of a sign handles noisy velocities in a log; a robot has none.
+    /// Friction curve of a robot. It has no dead band: dead bands only handle noisy velocities in a log.
     pub(super) fn curve(&self) -> VelocityCurve<'_> {
         match self {
             Self::Sign { .. } => VelocityCurve::Step { forward: true, backward: true },
@@ -69,7 +69,7 @@ impl VelocityLaw for CoulombShape {
 pub struct Coulomb {
     /// The joint.
     pub joint: usize,
-    /// The step near zero velocity.
+    /// The smoothed or unsmoothed sign function.
     pub shape: CoulombShape,
 }
 
@@ -81,8 +81,8 @@ impl VelocityLaw for Coulomb {
 }
 
 impl Coulomb {
-    /// Candidate widths of the smooth step, rad/s or m/s of a typical arm, in addition to the sign and the width stated
-    /// in a study.
+    /// Candidate widths of the smoothed sign function, rad/s or m/s of a typical arm. The unsmoothed sign function
+    /// and a width given in the study are also candidates.
     pub const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {

@@ -13,22 +13,22 @@ use super::{Coulomb, CoulombShape, DriveInertia, JointMotion, TermInput, TorqueT
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Effect of the shared drive.
+/// Effect of a shared drive on its two joints.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingEffect {
-    /// Cross inertia, kg m².
+    /// Cross term of inertia, kg m².
     Inertia,
-    /// Cross viscous friction, Nm s/rad.
+    /// Cross term of viscous friction, Nm s/rad.
     Viscous,
-    /// Coulomb friction of the drive's velocity, Nm.
+    /// Coulomb friction by the drive's velocity, Nm.
     Coulomb(CoulombShape),
 }
 
 impl CouplingEffect {
-    /// The term of a drive with this effect on a single joint, with the velocity ratio `ratio`, and the term's
-    /// parameter per unit of the drive's parameter.
+    /// Returns the term that corresponds to this effect for a drive of a single joint with the velocity ratio
+    /// `ratio`, and the parameter of the term per unit of the drive's parameter.
     pub fn of_joint(self, joint: usize, ratio: f64) -> (TorqueTerm, f64) {
         match self {
             Self::Inertia => (TorqueTerm::DriveInertia(DriveInertia { joint }), ratio * ratio),
@@ -44,18 +44,19 @@ impl CouplingEffect {
 pub struct Coupling {
     /// Name of the drive, used in the parameter's symbol.
     pub name: String,
-    /// One joint.
+    /// Index of one joint.
     pub first: usize,
-    /// The other joint.
+    /// Index of the other joint.
     pub second: usize,
     /// Drive velocity divided by the velocity of the first and of the second joint.
     pub ratios: [f64; 2],
-    /// The effect.
+    /// Effect of the drive.
     pub effect: CouplingEffect,
 }
 
 impl Coupling {
-    /// Valid magnitudes of a ratio: real gears are inside, and products of two ratios stay within the range of `f64`.
+    /// Valid magnitudes of a ratio: they include all real gears, and products of two ratios stay within the range of
+    /// `f64`.
     pub const RATIOS: core::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
     /// For joint `row`, the other joint and its ratio.
@@ -95,7 +96,7 @@ impl TermKind for Coupling {
     }
 
     fn is_nonnegative(&self) -> bool {
-        // Cross terms are checked together with their drive.
+        // Cross terms can be negative; they are checked together with their drive.
         false
     }
 

@@ -1,9 +1,10 @@
-//! A torque declared by the user: `τ = k f(q, q̇)` with an identified coefficient `k`, for springs, counterbalances,
-//! cables, gas struts, magnets and other position-dependent torques.
+//! A torque that the user declares: `τ = k f(q, q̇)` with an identified coefficient `k`, for springs,
+//! counterbalances, cables, gas struts, magnets and other position-dependent torques.
 //!
-//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] over the joint's position, or the caller's
-//! code ([`TorqueFunction`]). As for every term, the torque is the one that the drive has to give: a spring of
-//! stiffness `c` that pulls the joint back to `q₀` is `c (q - q₀)`; one that helps the drive has the opposite sign.
+//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] over the joint's position, or a function
+//! in the caller's code ([`TorqueFunction`]). As for every term, the torque is the one that the drive has to provide.
+//! A spring of stiffness `c` that pulls the joint back to `q₀` is `c (q - q₀)`; a spring that helps the drive has the
+//! opposite sign.
 
 use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
@@ -12,13 +13,13 @@ use crate::joint::{Joint, JointSpring};
 use crate::tree::Model;
 use serde::{Deserialize, Serialize};
 
-/// The coefficient of a declared torque of one joint.
+/// A declared torque of one joint; its parameter is the coefficient `k`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Declared {
     /// Symbol of the parameter: a letter, then letters, digits and `_`.
     pub name: String,
-    /// The joint that it acts on.
+    /// Index of the joint on which the torque acts.
     pub joint: usize,
     /// Function `f`.
     pub law: DeclaredLaw,
@@ -37,11 +38,11 @@ pub struct Declared {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum DeclaredLaw {
-    /// An expression of positions and velocities of any joints.
+    /// An expression of the positions and velocities of any joints.
     Expression(Expression),
-    /// A curve over the position of the joint.
+    /// A curve over the position of the torque's joint.
     Table(TorqueTable),
-    /// The caller's code.
+    /// A function in the caller's code.
     Function(TorqueFunction),
 }
 
@@ -80,14 +81,15 @@ impl Declared {
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     }
 
-    /// Derivatives of the torque per unit of the coefficient at a sample: `take(joint, is_velocity, slope)`.
+    /// Calls `take(joint, is_velocity, slope)` with the derivatives of the torque per unit of the coefficient at a
+    /// sample.
     fn slopes(&self, motion: &JointMotion<'_>, sample: usize, mut take: impl FnMut(usize, bool, f64)) {
         match &self.law {
             DeclaredLaw::Expression(expression) => {
                 expression.slopes(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample], take);
             }
             DeclaredLaw::Table(table) => take(self.joint, false, table.slope(motion.q_of(self.joint)[sample])),
-            // Differentiated by blocks elsewhere.
+            // This function is differentiated elsewhere, block by block.
             DeclaredLaw::Function(_) => {}
         }
     }

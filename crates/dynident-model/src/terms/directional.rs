@@ -1,8 +1,8 @@
 //! Friction with one parameter per direction of motion.
 //!
-//! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a step
-//! `s`. All four parameters are positive if friction dissipates power. If the step is a sign, the two Coulomb columns
-//! and an offset are linearly dependent: use only two of the three.
+//! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a
+//! smoothed or unsmoothed sign function `s`. All four parameters are positive if friction dissipates power. With an
+//! unsmoothed sign function, the two Coulomb columns and an offset are linearly dependent: use only two of the three.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
@@ -53,7 +53,7 @@ impl Direction {
         })
     }
 
-    /// Part of a function in this direction.
+    /// The half of a function that acts in this direction.
     fn half(self, halves: [MotionFunction; 2]) -> Vec<MotionFunction> {
         let [forward, backward] = halves;
         match self {
@@ -69,7 +69,7 @@ impl Direction {
 pub struct DirectionalViscous {
     /// The joint.
     pub joint: usize,
-    /// The direction in which it acts.
+    /// Direction of motion in which the friction acts.
     pub direction: Direction,
 }
 
@@ -93,7 +93,7 @@ impl Law for DirectionalViscous {
         })];
 }
 
-/// The law `asymmetric-viscous` of a study.
+/// The law `asymmetric-viscous` of a study: viscous friction with one coefficient per direction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -147,9 +147,9 @@ impl TermKind for DirectionalViscous {
 pub struct DirectionalCoulomb {
     /// The joint.
     pub joint: usize,
-    /// The direction in which it acts.
+    /// Direction of motion in which the friction acts.
     pub direction: Direction,
-    /// The step near zero velocity.
+    /// The smoothed or unsmoothed sign function.
     pub shape: CoulombShape,
 }
 
@@ -182,7 +182,7 @@ impl Law for DirectionalCoulomb {
     }];
 }
 
-/// The law `asymmetric-coulomb` of a study.
+/// The law `asymmetric-coulomb` of a study: Coulomb friction with one level per direction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

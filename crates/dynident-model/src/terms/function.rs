@@ -5,26 +5,26 @@ use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Step of the central differences, relative to the position or velocity (absolute around zero): cube root of the
+/// Step of the central differences, relative to the position or velocity (absolute near zero): the cube root of the
 /// rounding error, which is optimal for central differences.
 const DIFFERENCE_STEP: f64 = 6e-6;
 
 /// A function `f(q, q̇)` of positions and velocities of any joints, for a whole block of samples at once.
 ///
-/// It must be deterministic per sample, independent of the division into blocks.
+/// The values must depend only on the motion at each sample, not on the division into blocks.
 pub trait TorqueLaw: Debug + Send + Sync {
-    /// Writes one value per sample of `motion` into `out`: the torque that the drive has to give, per unit of the
-    /// coefficient; NaN where it is undefined.
+    /// Writes one value per sample of `motion` into `out`: the torque that the drive has to provide, per unit of the
+    /// coefficient. NaN where it is undefined.
     fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]);
 }
 
-/// A [`TorqueLaw`] with a name. Code is not serialised: a deserialised function has only its name, and no values.
+/// A [`TorqueLaw`] with a name. Code cannot be serialised: a deserialised function has a name but no values.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueFunction {
     /// Name in results.
     pub name: String,
-    /// Joints whose motion it depends on, ascending.
+    /// Joints on whose motion the function depends, ascending.
     pub follows: Vec<usize>,
     #[serde(skip)]
     law: Option<Arc<dyn TorqueLaw>>,
@@ -42,7 +42,7 @@ impl PartialEq for TorqueFunction {
 }
 
 impl TorqueFunction {
-    /// A function that depends on the motion of the joints `follows`.
+    /// Creates a function that depends on the motion of the joints `follows`.
     pub fn new(name: impl Into<String>, mut follows: Vec<usize>, law: Arc<dyn TorqueLaw>) -> Self {
         follows.sort_unstable();
         follows.dedup();
@@ -67,8 +67,8 @@ impl TorqueFunction {
         Some(value[0]).filter(|value| value.is_finite())
     }
 
-    /// Adds `weights · ∂f` with respect to the positions and velocities of its joints, by central differences with two
-    /// calls each. Adds nothing where `f` is undefined on either side.
+    /// Adds `weights · ∂f` with respect to the positions and velocities of the function's joints, by central
+    /// differences with two calls each. Adds nothing where `f` is undefined on either side.
     pub(super) fn apply_adjoint(&self, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 2]) {
         let [by_q, by_dq] = adjoints;
         let (mut q, mut dq) = (motion.q.to_vec(), motion.dq.to_vec());

@@ -5,7 +5,7 @@ use super::candidate::clamped_velocity;
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use core::fmt::Debug;
 
-/// Joints that a term acts on.
+/// Joints on which a term acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TermJoints {
     /// One joint.
@@ -14,7 +14,7 @@ pub enum TermJoints {
     Two(usize, usize),
 }
 
-/// How a term enters the equation of motion.
+/// Effect of a term in the equation of motion.
 #[derive(Clone, Copy, Debug)]
 pub enum TermAction<'a> {
     /// `factor q̈`: a constant entry of the mass matrix, on the diagonal for one joint, off the diagonal for two.
@@ -22,7 +22,7 @@ pub enum TermAction<'a> {
         /// Entry per unit of the parameter.
         factor: f64,
     },
-    /// `factor q̇`, with entries as for inertia.
+    /// `factor q̇`, with constant entries on or off the diagonal as for inertia.
     Damping {
         /// Entry per unit of the parameter.
         factor: f64,
@@ -35,7 +35,7 @@ pub enum TermAction<'a> {
     Hysteresis,
     /// Change of friction with temperature; zero at the reference temperature.
     Temperature,
-    /// A torque of one joint that depends on the positions and velocities of any joints.
+    /// A torque on one joint that depends on the positions and velocities of any joints.
     State(&'a dyn StateFunction),
 }
 
@@ -60,23 +60,23 @@ pub trait StateFunction: Debug {
         (0..motion.samples).find(|&sample| !self.is_inside(motion, sample))
     }
 
-    /// Joints whose motion it depends on, ascending.
+    /// Joints on whose motion the function depends, ascending.
     fn follows(&self) -> Vec<usize>;
 
-    /// Short description.
+    /// Short description of the function.
     fn description(&self) -> String;
 }
 
 /// Friction that depends on one velocity `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
 #[derive(Clone, Copy, Debug)]
 pub struct VelocityFriction<'a> {
-    /// Velocity ratios of its joints; the second one is used for two joints only.
+    /// Velocity ratios of the joints; the second ratio is used for two joints only.
     pub ratios: [f64; 2],
-    /// Function of the velocity, before load and fading.
+    /// Function of the velocity, before multiplication with the transmitted torque and the Stribeck factor.
     pub curve: VelocityCurve<'a>,
-    /// Whether it is multiplied by the absolute value of the load.
+    /// Whether the friction is multiplied by the absolute value of the transmitted torque.
     pub by_load: bool,
-    /// Constants `v` and `δ` of the factor `e^{-|w/v|^δ}`.
+    /// Constants `v` and `δ` of the Stribeck factor `e^{-|w/v|^δ}`.
     pub fading: Option<[f64; 2]>,
 }
 
@@ -89,11 +89,11 @@ impl<'a> VelocityFriction<'a> {
 /// Dependence of friction on velocity.
 #[derive(Clone, Copy, Debug)]
 pub enum VelocityCurve<'a> {
-    /// A sign; at rest, any value up to one. The fields are the directions in which it acts.
+    /// Sign function; at rest, friction has any value up to one. The fields are the directions in which it acts.
     Step {
-        /// At positive velocity.
+        /// Whether it acts at positive velocity.
         forward: bool,
-        /// At negative velocity.
+        /// Whether it acts at negative velocity.
         backward: bool,
     },
     /// A continuous function.
@@ -105,13 +105,13 @@ pub trait VelocityFunction: Debug {
     /// Value at velocity `dq`.
     fn value(&self, dq: f64) -> f64;
 
-    /// Derivative with respect to velocity; zero for a sign.
+    /// Derivative with respect to velocity; zero for an unsmoothed sign function.
     fn slope(&self, dq: f64) -> f64;
 
     /// Values for the motion of joint `joint`.
     fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]);
 
-    /// Adds `weights · slope` for the motion of joint `joint` to its part of `by_dq`.
+    /// Adds `weights · slope` for the motion of joint `joint` to the joint's part of `by_dq`.
     fn add_slopes(&self, joint: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64]) {
         let range = joint * motion.samples..(joint + 1) * motion.samples;
         for ((to, w), &dq) in by_dq[range].iter_mut().zip(weights).zip(motion.dq_of(joint)) {
@@ -132,60 +132,63 @@ pub struct MotionFunction {
     pub factor: f64,
 }
 
-/// Property of a joint in a robot description that corresponds to a term; URDF name (MJCF name).
+/// Property of a joint in a robot description that corresponds to a term, with its URDF name (and MJCF name if
+/// different).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointProperty {
-    /// `damping`.
+    /// Viscous friction, `damping`.
     Damping,
-    /// `friction` (`frictionloss`).
+    /// Coulomb friction, `friction` (`frictionloss`).
     Friction,
-    /// Not in URDF (`armature`).
+    /// Drive inertia, not in URDF (`armature`).
     DriveInertia,
-    /// Not in URDF (`stiffness`).
+    /// Spring stiffness, not in URDF (`stiffness`).
     Stiffness,
 }
 
-/// Coulomb step of a law while the friction of a joint is selected.
+/// Relation between the sign function of a law and that of the joint's Coulomb friction, while the friction of a
+/// joint is selected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRole {
-    /// Coulomb friction: its step is the joint's step.
+    /// The law is Coulomb friction, whose sign function is used for the joint.
     Joint,
-    /// The joint's step, if it is smooth.
+    /// The law uses the joint's sign function if that is smoothed.
     AsJointIfSmooth,
-    /// A sign if the joint's step is a sign; otherwise a smooth step of this width, rad/s (m/s).
+    /// The law uses an unsmoothed sign function if the joint does; otherwise a smoothed one of this width, rad/s
+    /// (m/s).
     Own {
-        /// The width.
+        /// Width of the smoothed sign function.
         width: f64,
     },
-    /// No step, or one that is not selected.
+    /// The law has no sign function, or one that is not selected.
     Fixed,
 }
 
-/// A constant of a term, such as a velocity or an exponent, for other programs.
+/// Value of a constant of a term (such as a velocity or an exponent), for export to other programs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TermConstant {
-    /// A number with its unit at a revolute joint, as used in file keys (`rad_s`); empty without a unit, or if the name
-    /// contains the unit.
+    /// A number with its unit at a revolute joint, as in file keys (`rad_s`). The unit is empty if the number has
+    /// none or the name contains it.
     Number(f64, &'static str),
     /// One number per joint.
     Numbers([f64; 2]),
     /// A keyword.
     Word(&'static str),
-    /// A step near zero velocity.
+    /// A smoothed or unsmoothed sign function.
     Step(CoulombShape),
     /// A text of the user.
     Text(String),
     /// Points of a curve.
     Points(Vec<[f64; 2]>),
-    /// Not applicable to this term.
+    /// The constant is not applicable to this term.
     Nothing,
 }
 
-/// Names of a term.
+/// Kind, symbol and unit of a term.
 pub struct TermLabel<'a> {
     /// Name of the kind.
     pub kind: &'static str,
-    /// Symbol of the parameter with the joint's number from 1.
+    /// Symbol of the parameter, with the number of the joint counted from 1.
     pub symbol: String,
     /// Unit of the parameter at a revolute joint.
     pub unit: &'a str,
@@ -193,26 +196,26 @@ pub struct TermLabel<'a> {
 
 /// Interface of a kind of torque term.
 pub trait TermKind: VelocityFunction {
-    /// Names of the term.
+    /// Kind, symbol and unit of the term.
     fn label(&self) -> TermLabel<'_>;
 
-    /// Joints that the term acts on.
+    /// Joints on which the term acts.
     fn joints(&self) -> TermJoints;
 
-    /// Whether a negative parameter is unphysical.
+    /// Whether a negative parameter is physically impossible.
     fn is_nonnegative(&self) -> bool {
         true
     }
 
-    /// How the term enters the equation of motion.
+    /// Effect of the term in the equation of motion.
     fn action(&self) -> TermAction<'_>;
 
-    /// Constants by name, in addition to joints and parameter.
+    /// Constants by name; joints and parameter are not included.
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         Vec::new()
     }
 
-    /// The regressor column in the row of joint `row`.
+    /// Computes the regressor column in the row of joint `row`.
     fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(row, motion, out);
     }
@@ -223,7 +226,7 @@ pub trait TermKind: VelocityFunction {
         self.add_slopes(row, motion, weights, by_dq);
     }
 
-    /// Functions of the motion that friction adds; functions that no other kind has are unique to this term.
+    /// Functions of the motion that the friction adds. A function that no other kind adds is unique to this term.
     fn functions(&self) -> Vec<MotionFunction> {
         let row = match (self.action(), self.joints()) {
             (TermAction::Inertia { .. } | TermAction::Constant, _) => return Vec::new(),
@@ -242,40 +245,41 @@ pub trait TermKind: VelocityFunction {
         None
     }
 
-    /// The step near zero velocity, if the law has one.
+    /// The sign function near zero velocity, if the law has one.
     fn step_mut(&mut self) -> Option<&mut CoulombShape> {
         None
     }
 
-    /// Coulomb step of the law during the friction selection.
+    /// Relation to the joint's sign function during the friction selection.
     fn step_role(&self) -> StepRole {
         StepRole::Fixed
     }
 
-    /// Width of the Coulomb step for this value of the named constant, rad/s (m/s); `None` for a constant that does not
-    /// determine the width.
+    /// Width of the smoothed sign function that corresponds to this value of the named constant, rad/s (m/s); `None`
+    /// for a constant that does not determine the width.
     fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
         (constant == "width").then_some(value)
     }
 
-    /// Equivalent dry friction of a joint that is at rest below the velocity `rest`, and the parameter of that term per
-    /// unit.
+    /// Equivalent dry friction of a joint that is at rest below the velocity `rest`: the term, and its parameter per
+    /// unit of this term's parameter.
     fn dry(&self, _rest: f64) -> Option<(TorqueTerm, f64)> {
         None
     }
 
-    /// Distance in one direction after which a law with memory equals Coulomb friction, rad (m).
+    /// Distance in one direction after which a law with hysteresis equals Coulomb friction, rad (m).
     fn sliding_distance(&self) -> Option<f64> {
         None
     }
 
-    /// For the forward part of directional friction: the backward part, and the term with equal parameters in both.
+    /// For the forward part of directional friction: the backward part, and the term that has equal parameters in
+    /// both directions.
     fn both_directions(&self) -> Option<[TorqueTerm; 2]> {
         None
     }
 
-    /// Constants that can be selected from recordings, as coordinates: logarithms, or multiples of another constant. By
-    /// default the width of the joint's step.
+    /// Constants that can be selected from recordings, as coordinates: logarithms, or multiples of another constant.
+    /// Default: the width of the joint's sign function.
     fn coordinates(&self) -> Vec<f64> {
         let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
         let width = self.constants().into_iter().find_map(|(_, constant)| match constant {
@@ -295,7 +299,8 @@ pub trait TermKind: VelocityFunction {
     }
 }
 
-/// Both parts of a function that directional [`MotionFunction`]s share: for positive and for negative velocity.
+/// Both halves of a function, for positive and for negative velocity; directional laws share these
+/// [`MotionFunction`]s.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {
     ['+', '-'].map(|sign| MotionFunction { row, function: format!("{function} {sign}"), factor: 1.0 })
 }

@@ -1,5 +1,5 @@
-//! A friction law as one expression over any scalar, from which value, regressor column, slope and generated code are
-//! derived.
+//! A friction law as one expression over any scalar. Value, regressor column, slope and generated code follow from
+//! it.
 
 use super::JointMotion;
 use super::candidate::CandidateLaw;
@@ -49,7 +49,7 @@ pub(super) trait Law: TermKind + VelocityLaw {
         Self::CANDIDATES.first()
     }
 
-    /// As [`TorqueTerm::torque`](super::TorqueTerm::torque); by default a function of its joint's velocity.
+    /// Like [`TorqueTerm::torque`](super::TorqueTerm::torque); by default a function of its joint's velocity.
     fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
         Ok(self.of(dq[row]))
     }

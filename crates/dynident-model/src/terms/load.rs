@@ -1,8 +1,9 @@
-//! Friction that grows with the load: `τ = k |τ_load| s(q̇)` with a step `s`.
+//! Friction that grows with the torque that a joint transmits (its load): `τ = k |τ_load| s(q̇)` with a smoothed or
+//! unsmoothed sign function `s`.
 //!
-//! `τ_load` is the torque carried by the gear: the rigid-body torque of an earlier estimate. It is passed together with
-//! the motion (see [`TermInput`](super::TermInput)); without it the column is zero. Source: Hamon, Gautier and Garrec,
-//! IROS 2010, 6187.
+//! `τ_load` is the torque that the gear transmits: the rigid-body torque of an earlier estimate. It is passed
+//! together with the motion (see [`TermInput`](super::TermInput)); without it the column is zero. Source: Hamon,
+//! Gautier and Garrec, IROS 2010, 6187.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
@@ -12,13 +13,13 @@ use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Share of the load that a joint loses to friction, dimensionless.
+/// Share of the transmitted torque that a joint loses to friction, dimensionless.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoadFriction {
     /// The joint.
     pub joint: usize,
-    /// The step near zero velocity.
+    /// The smoothed or unsmoothed sign function.
     pub shape: CoulombShape,
 }
 
@@ -39,12 +40,13 @@ impl Law for LoadFriction {
     }
 }
 
-/// The law `load` of a study.
+/// The law `load` of a study: friction proportional to the transmitted torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StatedLoad {
-    /// As for `stribeck`.
+    /// Width of the smoothed sign function, rad/s or m/s; by default the sign function of the joint's Coulomb
+    /// friction is used.
     #[serde(default)]
     pub width: Option<f64>,
 }

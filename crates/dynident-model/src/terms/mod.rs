@@ -1,6 +1,7 @@
-//! Torque terms in addition to the rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each
-//! term is one parameter and one regressor column per joint that it acts on. Each kind is one file and a row of
-//! [`TorqueTerm`]; a law that a study can state also has a row of [`FrictionTerm`]. No other code lists friction laws.
+//! Torque terms in addition to the rigid bodies: friction, drive inertia, offsets, couplings and declared
+//! (user-defined) torques. Each term has one parameter, and one regressor column for each joint on which it acts.
+//! Each kind is one file and a row of [`TorqueTerm`]; a law that can be used in a study also has a row of
+//! [`FrictionTerm`]. No other code lists friction laws.
 
 mod candidate;
 mod class;
@@ -74,11 +75,11 @@ pub struct JointMotion<'a> {
 /// Inputs of a term in addition to the motion of a block.
 #[derive(Debug)]
 pub struct TermInput<'a> {
-    /// Load of the term's joint at every sample, Nm (N), if known.
+    /// Torque that the term's joint transmits at every sample, Nm (N), if known.
     pub load: Option<&'a [f64]>,
     /// Temperature of the term's joint at every sample, °C, if measured.
     pub temperature_c: Option<&'a [f64]>,
-    /// State of a term with memory; updated by this block.
+    /// State of a term with hysteresis; this block updates it.
     pub memory: &'a mut HysteresisState,
 }
 
@@ -102,7 +103,7 @@ impl<'a> JointMotion<'a> {
 /// Declares all kinds: the enum, and functions that depend on the type of a kind.
 macro_rules! torque_terms {
     ($($(#[$documentation:meta])* $kind:ident($type:ident),)*) => {
-        /// One parameter of the drives, linear in the joint torques.
+        /// A torque term with one parameter; the torque is linear in the parameter.
         #[doc(alias("friction", "torque term", "actuator"))]
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -112,7 +113,7 @@ macro_rules! torque_terms {
         }
 
         impl TorqueTerm {
-            /// The interface of its kind.
+            /// Interface of the term's kind.
             pub fn kind(&self) -> &dyn TermKind {
                 match self {
                     $(Self::$kind(term) => term,)*
@@ -125,12 +126,13 @@ macro_rules! torque_terms {
                 }
             }
 
-            /// All candidates of the friction selection, in the order in which they are tried.
+            /// All candidate laws of the friction selection, in the order in which they are tested.
             pub fn candidates() -> impl Iterator<Item = &'static CandidateLaw> {
                 [$($type::CANDIDATES),*].into_iter().flatten()
             }
 
-            /// The [`candidates`](Self::candidates) entry of the term; `None` for terms that are not selected.
+            /// The entry of [`candidates`](Self::candidates) that corresponds to the term; `None` for terms that are
+            /// not selected.
             pub fn candidate(&self) -> Option<&'static CandidateLaw> {
                 match self {
                     $(Self::$kind(term) => term.candidate(),)*
@@ -138,8 +140,8 @@ macro_rules! torque_terms {
             }
 
             /// Torque of joint `row` per unit of the parameter at the velocities `dq`, over any scalar. Only the
-            /// dependence on velocities is included: zero for inertia and declared torques, and for a change with
-            /// temperature at its reference.
+            /// dependence on velocities is included. The result is zero for inertia, declared torques and (at the
+            /// reference temperature) changes with temperature.
             ///
             /// # Errors
             /// The additional quantity that the term needs.
@@ -155,19 +157,19 @@ macro_rules! torque_terms {
 torque_terms! {
     /// Torque proportional to velocity.
     Viscous(Viscous),
-    /// Torque by the sign of the velocity.
+    /// Torque that depends on the sign of the velocity.
     Coulomb(Coulomb),
     /// Torque proportional to velocity, in one direction.
     DirectionalViscous(DirectionalViscous),
-    /// Torque by the sign of the velocity, in one direction.
+    /// Torque that depends on the sign of the velocity, in one direction.
     DirectionalCoulomb(DirectionalCoulomb),
-    /// A shifted smooth step.
+    /// Sigmoid function of the velocity.
     Sigmoid(Sigmoid),
     /// Additional torque near zero velocity.
     Stribeck(Stribeck),
     /// Torque by a power of the velocity.
     Power(Power),
-    /// Torque proportional to the load, against the motion.
+    /// Torque proportional to the transmitted torque, against the motion.
     Load(LoadFriction),
     /// A spring with a slider: hysteresis.
     MaxwellSlip(MaxwellSlip),
@@ -181,11 +183,11 @@ torque_terms! {
     DriveInertia(DriveInertia),
     /// Inertia or friction of a drive that is coupled to two joints.
     Coupling(Coupling),
-    /// A torque of positions and velocities that the user declares.
+    /// A torque that depends on positions and velocities and that the user declares.
     Declared(Declared),
 }
 
-/// Declares all laws that a study can state.
+/// Declares all laws that can be used in a study.
 macro_rules! friction_terms {
     ($($(#[$documentation:meta])* $law:ident($type:ident),)*) => {
         /// A law of `drive.laws`, in addition to `viscous`, `coulomb` and `offset`.
@@ -197,7 +199,7 @@ macro_rules! friction_terms {
         }
 
         impl FrictionTerm {
-            /// The law with the stated constants.
+            /// The law with the constants given in the study.
             pub fn law(&self) -> &dyn StudyLaw {
                 match self {
                     $(Self::$law(law) => law,)*
@@ -215,30 +217,30 @@ macro_rules! friction_terms {
 }
 
 friction_terms! {
-    /// Viscous friction by direction, in place of `viscous`.
+    /// Viscous friction with one coefficient per direction, instead of `viscous`.
     AsymmetricViscous(AsymmetricViscous),
-    /// Coulomb friction by direction, in place of `coulomb`. With a sign step it is linearly dependent on `offset`:
-    /// disable one of them.
+    /// Coulomb friction with one level per direction, instead of `coulomb`. With an unsmoothed sign function it is
+    /// linearly dependent on `offset`: disable one of them.
     AsymmetricCoulomb(AsymmetricCoulomb),
-    /// `e^{-|dq/speed|^exponent}` times the step.
+    /// Stribeck friction: `e^{-|dq/speed|^exponent}` times a sign function.
     Stribeck(StatedStribeck),
-    /// A shifted smooth step, in place of `coulomb`.
+    /// Sigmoid function of the velocity, instead of `coulomb`.
     Sigmoid(StatedSigmoid),
     /// Torque by the cube root of the velocity.
     CubeRoot(CubeRoot),
     /// Torque by the square of the velocity.
     Quadratic(Quadratic),
-    /// Torque proportional to the load, against the motion.
+    /// Torque proportional to the transmitted torque, against the motion.
     Load(StatedLoad),
-    /// Change of viscous and Coulomb friction with the joint's temperature, in addition to `viscous` and `coulomb`;
-    /// logs need a `temperature`.
+    /// Change of viscous and Coulomb friction with the joint's temperature, in addition to `viscous` and `coulomb`.
+    /// The logs need a `temperature` column.
     Temperature(StatedTemperature),
-    /// Maxwell-slip elements, one per yield displacement.
+    /// Friction with hysteresis: Maxwell-slip elements, one per yield displacement.
     MaxwellSlip(StatedMaxwellSlip),
 }
 
-/// Terms of all joints, selected by `choose`, joint by joint in the project's order: drive inertia, viscous, Coulomb,
-/// offset.
+/// Terms of all joints, selected by `choose`. Joint by joint, in the usual order: drive inertia, viscous friction,
+/// Coulomb friction, offset.
 pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoice) -> Vec<TorqueTerm> {
     let mut terms = Vec::new();
     for joint in 0..model.dof() {
@@ -259,14 +261,14 @@ pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoi
     terms
 }
 
-/// Terms of a joint.
+/// Selection of the terms of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveChoice {
     /// Inertia of the drive, reflected to the joint.
     pub drive_inertia: bool,
     /// Viscous friction.
     pub viscous: bool,
-    /// Coulomb friction and its shape near zero velocity.
+    /// Coulomb friction, with its smoothed or unsmoothed sign function.
     pub coulomb: Option<CoulombShape>,
     /// Constant offset.
     pub offset: bool,

@@ -1,9 +1,10 @@
-//! The project's order of torque terms.
+//! The order of torque terms in all lists.
 
 use super::{JointProperty, TermAction, TorqueTerm};
 
-/// Sorts terms into the project's order: drive inertia, viscous, Coulomb and offset, joint by joint; then further
-/// friction, joint by joint in the given order; then couplings; then declared torques in the given order.
+/// Sorts terms into the usual order: first drive inertia, viscous friction, Coulomb friction and offset, joint by
+/// joint; then further friction, joint by joint in the given order; then couplings; then declared torques in the
+/// given order.
 pub fn sort_terms(terms: &mut [TorqueTerm]) {
     terms.sort_by_key(|term| match (term.own_joint(), term.property(), term.action()) {
         (_, _, TermAction::State(_)) => (3, 0, 0),

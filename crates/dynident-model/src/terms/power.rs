@@ -1,8 +1,8 @@
-//! Friction by a power of velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)` for
-//! velocities well above `ε`.
+//! Friction by a power of velocity, rounded near rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)`
+//! for velocities well above `ε`.
 //!
-//! `p = 1/3`: sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope of the
-//! cube root finite at rest.
+//! The power `p = 1/3` describes sub-linear losses of harmonic drives, `p = 2` churning of lubricant. The rounding
+//! keeps the slope of the cube root finite at rest.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
@@ -20,13 +20,14 @@ pub struct Power {
     pub joint: usize,
     /// The power.
     pub exponent: PowerExponent,
-    /// Velocity `ε` of the rounding, rad/s or m/s, positive.
+    /// Velocity `ε` below which the function is rounded, rad/s or m/s, positive.
     pub rounding: f64,
 }
 
 impl Power {
-    /// Default rounding, below the velocity that a differentiated encoder distinguishes from rest, rad/s or m/s of a
-    /// typical arm ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)).
+    /// Default of the rounding velocity, rad/s or m/s of a typical arm
+    /// ([`CharacteristicScale::velocity`](crate::CharacteristicScale::velocity)): a differentiated encoder signal
+    /// cannot distinguish it from rest.
     pub const ROUNDING: f64 = 1.0e-3;
 
     fn usual(own: &StatedJoint, exponent: PowerExponent) -> Vec<TorqueTerm> {
@@ -89,7 +90,7 @@ impl Law for Power {
     }
 }
 
-/// The law `cube-root` of a study.
+/// The law `cube-root` of a study: friction by the cube root of the velocity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -101,7 +102,7 @@ impl StudyLaw for CubeRoot {
     }
 }
 
-/// The law `quadratic` of a study.
+/// The law `quadratic` of a study: friction by the square of the velocity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

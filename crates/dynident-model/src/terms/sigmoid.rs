@@ -1,8 +1,8 @@
 //! Friction as one sigmoid: `τ = φ₁ [1/(1 + e^{-φ₂(q̇ + φ₃)}) - 1/(1 + e^{-φ₂ φ₃})]`.
 //!
-//! It is a Coulomb step of height `φ₁` centred at `-φ₃`, linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is
-//! half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4
-//! (2019) 4147.
+//! This is Coulomb friction with a smoothed sign function of total height `φ₁`, centred at the velocity `-φ₃`. It is
+//! linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is half of a Coulomb friction with the width `2/φ₂`.
+//! Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4 (2019) 4147.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_velocity};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
@@ -12,7 +12,7 @@ use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// The step of one joint, Nm (N).
+/// Sigmoid friction of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Sigmoid {
@@ -29,9 +29,9 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-/// Candidate widths of half a Coulomb step, rad/s or m/s of a typical arm.
+/// Candidate widths of the sigmoid, as widths of a smoothed sign function, rad/s or m/s of a typical arm.
 const CANDIDATE_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
-/// Largest shift of the step from zero velocity, in units of its width.
+/// Largest shift of the sigmoid from zero velocity, in units of its width.
 const MAX_SHIFT: f64 = 2.0;
 
 impl VelocityLaw for Sigmoid {
@@ -69,9 +69,9 @@ impl Law for Sigmoid {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StatedSigmoid {
-    /// s/rad or s/m.
+    /// Steepness `φ₂`, s/rad or s/m.
     pub steepness: f64,
-    /// rad/s or m/s.
+    /// Offset of the velocity `φ₃`, rad/s or m/s.
     #[serde(default)]
     pub offset_speed: f64,
 }
@@ -117,14 +117,14 @@ impl TermKind for Sigmoid {
         (constant == "steepness").then_some(2.0 / value)
     }
 
-    /// Without offset it is half a Coulomb step.
+    /// Without offset the sigmoid is half of a Coulomb friction.
     fn dry(&self, rest: f64) -> Option<(TorqueTerm, f64)> {
         let shape = CoulombShape::Sign { dead_band: 0.0 };
         let coulomb = TorqueTerm::Coulomb(Coulomb { joint: self.joint, shape });
         (self.offset_speed.abs() <= rest).then_some((coulomb, 0.5))
     }
 
-    /// Second coordinate: shift of the step in units of its width.
+    /// Second coordinate: shift of the sigmoid in units of its width.
     fn coordinates(&self) -> Vec<f64> {
         vec![self.steepness.ln(), 0.5 * self.offset_speed * self.steepness]
     }

@@ -1,11 +1,11 @@
 //! One element of the generalised Maxwell-slip model: a spring in series with a Coulomb slider, `τ = W z/Δ`.
 //!
-//! The spring's deflection follows the joint and is limited by the yield displacement: `z ← clamp(z + q_k - q_{k-1},
-//! -Δ, Δ)`. Parallel elements with a grid of `Δ` give friction with hysteresis after reversals, linear in their yield
-//! torques `W`. The deflection is the only state of a term between samples ([`HysteresisState`]). A recording starts
-//! undeflected, and the initial state is forgotten after a motion of 2Δ in one direction. Source: Al-Bender, Lampaert
-//! and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding dynamics); Lampaert, Swevers and
-//! Al-Bender (2002).
+//! The spring's deflection z follows the joint and is limited by the yield displacement Δ: `z ← clamp(z + q_k -
+//! q_{k-1}, -Δ, Δ)`. Parallel elements with a grid of `Δ` give friction with hysteresis after reversals, linear in
+//! their yield torques `W`. The deflection is the only state of a term between samples ([`HysteresisState`]). A
+//! recording starts without deflection; the initial state has no effect after a motion of 2Δ in one direction.
+//! Source: Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding
+//! dynamics); Lampaert, Swevers and Al-Bender (2002).
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
@@ -15,7 +15,7 @@ use super::{FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Yield torque of one element of one joint, Nm (N).
+/// One Maxwell-slip element of one joint; the parameter is its yield torque, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MaxwellSlip {
@@ -40,7 +40,7 @@ impl HysteresisState {
 
 /// Candidate yield displacements, rad, or m of a typical arm.
 const CANDIDATE_YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
-/// Maximum number of elements of one joint; each is a column.
+/// Maximum number of elements of one joint; each element is a regressor column.
 const MAX_ELEMENTS: f64 = 50.0;
 
 impl MaxwellSlip {
@@ -63,12 +63,12 @@ impl Law for MaxwellSlip {
     }
 }
 
-/// The law `maxwell-slip` of a study.
+/// The law `maxwell-slip` of a study: friction with hysteresis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StatedMaxwellSlip {
-    /// rad or m.
+    /// Yield displacements of the elements, rad or m.
     pub yield_displacements: Vec<f64>,
 }
 

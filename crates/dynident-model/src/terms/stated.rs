@@ -1,23 +1,23 @@
-//! Friction laws as stated in a study.
+//! Friction laws as a study contains them.
 
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
 use crate::CharacteristicScale;
 use core::fmt::Debug;
 
-/// The joint for which a law is stated.
+/// The joint to which a study assigns a law.
 #[derive(Clone, Copy, Debug)]
 pub struct StatedJoint {
     /// Index of the joint.
     pub joint: usize,
-    /// Its Coulomb step.
+    /// The sign function of the joint's Coulomb friction.
     pub step: CoulombShape,
-    /// Whether it is revolute.
+    /// Whether the joint is revolute.
     pub is_rotary: bool,
-    /// The robot's scale.
+    /// Characteristic time and length of the robot.
     pub scale: CharacteristicScale,
 }
 
-/// An invalid constant of a stated law.
+/// An invalid constant of a law in a study.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs, reason = "the messages describe the fields")]
 pub enum StatedFault {
@@ -38,7 +38,7 @@ pub(super) fn check(key: &'static str, value: f64, range: [f64; 2]) -> Result<()
     if (least..=most).contains(&value) { Ok(()) } else { Err(StatedFault::Range { key, value, range }) }
 }
 
-/// A law with the constants stated in a study.
+/// A law with the constants given in a study.
 pub trait StudyLaw: Debug {
     /// Terms of the law at a joint.
     fn terms(&self, joint: &StatedJoint) -> Vec<TorqueTerm>;
@@ -62,7 +62,7 @@ pub trait StudyLaw: Debug {
     }
 }
 
-/// A smooth step of this width, or the joint's step.
+/// A smoothed sign function of this width; without a width, the joint's sign function.
 pub(super) fn step_or(width: Option<f64>, joint: &StatedJoint) -> CoulombShape {
     width.map_or(joint.step, |width| CoulombShape::Smooth { width })
 }

@@ -1,7 +1,8 @@
-//! The Stribeck effect: more friction near rest than in fast motion, `τ = F_s e^{-|q̇/v_s|^δ} s(q̇)` with a step `s`.
+//! Stribeck effect, more friction near rest than in fast motion: `τ = F_s e^{-|q̇/v_s|^δ} s(q̇)` with a smoothed or
+//! unsmoothed sign function `s`.
 //!
-//! `F_s` is the static friction in excess of Coulomb friction `F_c`. Linear in `F_s` at given `v_s` and `δ`. Source:
-//! Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
+//! `F_s` is the excess of static friction over Coulomb friction `F_c`. The law is linear in `F_s` at given `v_s` and
+//! `δ`. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_exp, clamped_velocity};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
@@ -21,17 +22,17 @@ pub struct Stribeck {
     pub speed: f64,
     /// Exponent `δ`, positive; usually 1 to 2.8.
     pub exponent: f64,
-    /// The step near zero velocity.
+    /// The smoothed or unsmoothed sign function.
     pub shape: CoulombShape,
 }
 
-/// Candidate velocities, rad/s or m/s of a typical arm, and exponents.
+/// Candidate Stribeck velocities, rad/s or m/s of a typical arm, and candidate exponents.
 const CANDIDATE_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const CANDIDATE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Bounds of the exponent.
 const EXPONENT_BOUNDS: [f64; 2] = [0.5, 3.0];
-/// Width of a smooth step relative to the Stribeck velocity during the friction selection: the step saturates at half
-/// that velocity.
+/// Width of a smoothed sign function relative to the Stribeck velocity during the friction selection: the function
+/// saturates at half of that velocity.
 const STEP_WIDTH_RATIO: f64 = 0.25;
 
 impl VelocityLaw for Stribeck {
@@ -68,11 +69,12 @@ impl Law for Stribeck {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StatedStribeck {
-    /// rad/s or m/s.
+    /// Stribeck velocity `v_s`, rad/s or m/s.
     pub speed: f64,
     /// Exponent `δ`; usually 1 to 2.8.
     pub exponent: f64,
-    /// Width of its smooth step, rad/s or m/s; by default the step is the joint's Coulomb step.
+    /// Width of the smoothed sign function, rad/s or m/s; by default the sign function of the joint's Coulomb
+    /// friction is used.
     #[serde(default)]
     pub width: Option<f64>,
 }

@@ -1,11 +1,12 @@
-//! Friction that changes with temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
+//! Friction that changes with temperature T: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a smoothed or
+//! unsmoothed sign function `s`.
 //!
-//! The terms are added to viscous and Coulomb friction, which then apply at T₀: coefficients are linear in temperature,
-//! `F_v(T) = F_v + F_vT (T − T₀)`. Grease viscosity decreases with temperature, so F_vT is usually negative, but both
-//! signs are physical. The temperature is passed together with the motion (see [`TermInput`](super::TermInput));
-//! without it the joint is at T₀ and the column is zero. The linear law holds for a range of about 20 K; beyond it the
-//! viscous part decreases exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014)
-//! 1484; Simoni et al., IFAC PapersOnLine 48 (2015) 183.
+//! The terms are added to viscous and Coulomb friction, whose coefficients then apply at the reference temperature
+//! T₀: `F_v(T) = F_v + F_vT (T − T₀)`. Grease viscosity decreases with temperature, so F_vT is usually negative, but
+//! both signs are physically possible. The temperature is passed together with the motion (see
+//! [`TermInput`](super::TermInput)); without it the joint is assumed to be at T₀ and the column is zero. The linear
+//! law is valid for a range of about 20 K; beyond it the viscous part decreases exponentially. Source: Bittencourt
+//! and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC PapersOnLine 48 (2015) 183.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub struct TemperatureViscous {
     /// The joint.
     pub joint: usize,
-    /// T₀, °C.
+    /// Reference temperature T₀, °C.
     pub reference_c: f64,
 }
 
@@ -29,9 +30,9 @@ pub struct TemperatureViscous {
 pub struct TemperatureCoulomb {
     /// The joint.
     pub joint: usize,
-    /// T₀, °C.
+    /// Reference temperature T₀, °C.
     pub reference_c: f64,
-    /// The step near zero velocity.
+    /// The smoothed or unsmoothed sign function.
     pub shape: CoulombShape,
 }
 
@@ -43,7 +44,7 @@ impl TemperatureViscous {
 }
 
 impl TemperatureCoulomb {
-    /// `(T − T₀) s(q̇)`.
+    /// `(T − T₀) s(q̇)`: torque per unit of the parameter at the temperature `temperature_c` (°C) and velocity `dq`.
     pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
         (temperature_c - self.reference_c) * self.shape.step(dq)
     }
@@ -57,7 +58,7 @@ impl VelocityLaw for TemperatureCoulomb {}
 
 impl Law for TemperatureCoulomb {}
 
-/// The law `temperature` of a study.
+/// The law `temperature` of a study: friction that changes with temperature.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -168,7 +169,7 @@ impl TermKind for TemperatureCoulomb {
     }
 }
 
-/// Column from temperature and velocity at every sample; zero without a temperature.
+/// Regressor column from temperature and velocity at every sample; zero without a temperature.
 fn by_temperature(
     joint: usize,
     motion: &JointMotion<'_>,

@@ -1,16 +1,16 @@
 //! A torque measured at several positions, with smooth interpolation: the characteristic of a spring.
 //!
-//! The curve is piecewise cubic with slopes by Fritsch and Butland: weighted harmonic mean of the adjacent slopes, zero
-//! at a peak. It is monotone where the points are, has no overshoot between two equal points, and its first derivative
-//! is continuous. Beyond the ends the torque is constant, so that a design or a simulation beyond the range can
-//! continue; a log beyond the range is rejected ([`TorqueTerm::undefined`](super::TorqueTerm::undefined)). Source:
-//! Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, with three-point slopes at the ends as in SciPy's
-//! `PchipInterpolator`.
+//! The curve is piecewise cubic with slopes by Fritsch and Butland: weighted harmonic mean of the adjacent slopes,
+//! zero at a peak. It is monotone where the points are monotone and has no overshoot between two equal points. Its
+//! first derivative is continuous. Beyond the ends the torque is constant, so that a design or a simulation can go
+//! beyond the range. A log beyond the range is rejected ([`TorqueTerm::undefined`](super::TorqueTerm::undefined)).
+//! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, with three-point slopes at the ends as in
+//! SciPy's `PchipInterpolator`.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Maximum number of points; each piece is several lines of an exported program.
+/// Maximum number of points. Each piece between two points becomes several lines of an exported program.
 const MAX_POINTS: usize = 200;
 /// Largest magnitude of a position or torque.
 const MAX_VALUE: f64 = 1e9;
@@ -49,7 +49,7 @@ pub enum TorqueTableError {
     Order { number: usize, position: f64, before: f64 },
 }
 
-/// One cubic: `torque + b t + c t² + d t³` with `t` from zero to `width`.
+/// One cubic polynomial: `torque + b t + c t² + d t³` with `t` from zero to `width`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TablePiece {
     /// Start position, rad or m.
@@ -63,7 +63,7 @@ pub struct TablePiece {
 }
 
 impl TorqueTable {
-    /// Curve through points of position (rad, m) and torque.
+    /// Creates the curve through points of position (rad, m) and torque.
     ///
     /// # Errors
     /// Fewer than 2 or more than 200 points, numbers that are not finite or above 1e9, positions that do not ascend.
@@ -76,7 +76,7 @@ impl TorqueTable {
                 return Err(TorqueTableError::Number { number: place + 1, value });
             }
             let before = place.checked_sub(1).map_or(f64::NEG_INFINITY, |before| points[before][0]);
-            // Widths are denominators.
+            // The width of each piece is a divisor.
             if point[0] - before < 1e-9 {
                 return Err(TorqueTableError::Order { number: place + 1, position: point[0], before });
             }

@@ -12,7 +12,7 @@ impl TorqueTerm {
         self.kind().label().kind
     }
 
-    /// Symbol of the parameter with the joint's number from 1 (`fv3`), as in the literature.
+    /// Symbol of the parameter, as in the literature, with the number of the joint counted from 1 (`fv3`).
     pub fn symbol(&self) -> String {
         self.kind().label().symbol
     }
@@ -22,12 +22,12 @@ impl TorqueTerm {
         self.kind().label().unit
     }
 
-    /// Constants by name, in addition to joints and parameter.
+    /// Constants by name; joints and parameter are not included.
     pub fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         self.kind().constants()
     }
 
-    /// The same law with another step near zero velocity, if it has one.
+    /// The same law with another sign function near zero velocity, if it has one.
     #[must_use]
     pub fn with_step(mut self, other: impl Fn(CoulombShape) -> CoulombShape) -> Self {
         if let Some(step) = self.kind_mut().step_mut() {
@@ -36,7 +36,7 @@ impl TorqueTerm {
         self
     }
 
-    /// The step near zero velocity, if the law has one.
+    /// The sign function near zero velocity, if the law has one.
     pub fn step(&self) -> Option<CoulombShape> {
         self.constants().into_iter().find_map(|(_, constant)| match constant {
             TermConstant::Step(step) => Some(step),
@@ -44,7 +44,8 @@ impl TorqueTerm {
         })
     }
 
-    /// Width of the Coulomb step, rad/s (m/s), 0 for a sign; `None` for a law without a step.
+    /// Width of the smoothed sign function, rad/s (m/s), 0 if it is not smoothed; `None` for a law without a sign
+    /// function.
     pub fn step_width(&self) -> Option<f64> {
         self.constants().into_iter().find_map(|(name, constant)| match constant {
             TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
@@ -71,7 +72,7 @@ impl TorqueTerm {
         }
     }
 
-    /// Joints that the term acts on.
+    /// Joints on which the term acts.
     pub fn joints(&self) -> Vec<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => vec![joint],
@@ -79,7 +80,7 @@ impl TorqueTerm {
         }
     }
 
-    /// The only joint that the term acts on; `None` for a drive that is coupled to two joints.
+    /// The only joint on which the term acts; `None` for a drive that is coupled to two joints.
     pub fn own_joint(&self) -> Option<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => Some(joint),
@@ -95,7 +96,7 @@ impl TorqueTerm {
         }
     }
 
-    /// How the term enters the equation of motion.
+    /// Effect of the term in the equation of motion.
     pub fn action(&self) -> TermAction<'_> {
         self.kind().action()
     }
@@ -127,9 +128,9 @@ impl TorqueTerm {
         }
     }
 
-    /// True if a negative parameter is impossible: friction dissipates power at every velocity, and inertia is
-    /// positive. An offset or a change with temperature may have either sign; the cross terms of a coupling are checked
-    /// together with their drive.
+    /// True if a negative parameter is physically impossible: friction dissipates power at every velocity, and
+    /// inertia is positive. An offset or a change with temperature can have either sign. The cross terms of a
+    /// coupling are checked together with their drive.
     pub fn is_nonnegative(&self) -> bool {
         self.kind().is_nonnegative()
     }
@@ -147,7 +148,7 @@ impl TorqueTerm {
         }
     }
 
-    /// True if the column needs the joint's load.
+    /// True if the column needs the torque that the joint transmits.
     pub fn needs_load(&self) -> bool {
         match self.action() {
             TermAction::Friction(friction) => friction.by_load,
@@ -178,13 +179,13 @@ impl TorqueTerm {
         }
     }
 
-    /// First sample of a motion at which a declared torque is undefined: its expression has no value, or its table ends
-    /// before. The column is zero there, or has the last value of the table.
+    /// First sample of a motion at which a declared torque is undefined: its expression has no value there, or the
+    /// position is outside its table. The column is zero at such a sample, or has the last value of the table.
     pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
         self.state_function()?.first_outside(motion)
     }
 
-    /// True if the column depends on earlier samples.
+    /// True if the column depends on earlier samples (hysteresis).
     pub fn has_memory(&self) -> bool {
         match self.action() {
             TermAction::Hysteresis => true,
@@ -197,7 +198,7 @@ impl TorqueTerm {
         }
     }
 
-    /// True for friction, of one joint or of a shared drive: all but inertia, offset and declared torques.
+    /// True for friction of one joint or of a shared drive: all terms except inertia, offset and declared torques.
     pub fn is_friction(&self) -> bool {
         match self.action() {
             TermAction::Inertia { .. } | TermAction::Constant | TermAction::State(_) => false,
@@ -207,7 +208,7 @@ impl TorqueTerm {
         }
     }
 
-    /// True for friction of one joint: all but offset, drive inertia, couplings and declared torques.
+    /// True for friction of one joint: all terms except offset, drive inertia, couplings and declared torques.
     pub fn is_joint_friction(&self) -> bool {
         self.is_friction() && self.own_joint().is_some()
     }
@@ -229,9 +230,9 @@ impl TorqueTerm {
         }
     }
 
-    /// Regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The
-    /// block is a separate recording, without known load or temperature; otherwise use
-    /// [`column_following`](TorqueTerm::column_following).
+    /// Computes the regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at
+    /// sample `s`. The block is treated as a separate recording, without known transmitted torque or temperature;
+    /// otherwise use [`column_following`](TorqueTerm::column_following).
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](TorqueTerm::joints) or `out` is not one value per sample.
@@ -240,8 +241,8 @@ impl TorqueTerm {
         self.column_following(row, motion, &mut input, out);
     }
 
-    /// Regressor column as [`column`](TorqueTerm::column), for a block that continues a recording; a simulation passes
-    /// blocks of one sample.
+    /// Computes the regressor column like [`column`](TorqueTerm::column), for a block that continues a recording. A
+    /// simulation passes blocks of one sample.
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value
@@ -254,8 +255,8 @@ impl TorqueTerm {
     }
 
     /// Adds the derivatives of `Σ weights[s] · column[s]` with respect to positions, velocities and accelerations to
-    /// the three parts of `gradient` (joint-major), where `column` is that of [`column`](TorqueTerm::column) in the row
-    /// of joint `row`. The sign step and the deflection of a Maxwell-slip element are treated as constant.
+    /// the three parts of `gradient` (joint-major). `column` is that of [`column`](TorqueTerm::column) in the row of
+    /// joint `row`. An unsmoothed sign function and the deflection of a Maxwell-slip element are treated as constant.
     ///
     /// # Panics
     /// If lengths differ.

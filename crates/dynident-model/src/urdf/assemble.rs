@@ -27,8 +27,8 @@ pub(super) fn model(
     let (mut tree_joints, mut bodies) = (Vec::new(), Vec::<Body>::new());
     let mut reached = vec![false; links.len()];
     reached[root] = true;
-    // Joints to be visited, with the body of their parent link and the link's pose in it. A stack avoids recursion,
-    // because a chain may be as long as the file.
+    // Joints to be visited, with the body of their parent link and the pose of that link in the body. A stack avoids
+    // recursion, because a chain can be as long as the file.
     let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
     let visit_later = |ahead: &mut Vec<_>, link: usize, body: Option<usize>, placement: Transform| {
         ahead.extend(connections.joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));
@@ -129,7 +129,7 @@ fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
     }
 }
 
-/// Joints whose mimic source is not in the document; this is frequent if the URDF is a part of a larger robot.
+/// Joints that follow a joint that is not in the document; this is frequent if the URDF is a part of a larger robot.
 pub(super) fn unknown_mimics(joints: &[JointElement<'_, '_>]) -> Vec<UrdfIrregularity> {
     let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
     let unknown = joints.iter().filter_map(|joint| {

@@ -9,7 +9,7 @@ use crate::xml::shortened;
 use roxmltree::Node;
 
 /// All shapes of a link, in the order of the document, and the elements without a usable shape: empty, of an unknown
-/// geometry, or with invalid sizes. A faulty shape is not an error, because shapes have no influence on dynamics; it
+/// geometry, or with invalid sizes. An invalid shape is not an error, because shapes do not influence dynamics; it
 /// becomes [`CollisionGeometry::Unsupported`].
 pub(super) fn shapes<'a, 'input>(link: Node<'a, 'input>) -> (Vec<CollisionShape>, Vec<Node<'a, 'input>>) {
     let (mut shapes, mut faulty) = (Vec::new(), Vec::new());
@@ -27,7 +27,7 @@ pub(super) fn shapes<'a, 'input>(link: Node<'a, 'input>) -> (Vec<CollisionShape>
     (shapes, faulty)
 }
 
-/// The shape (`None` for an empty element), or its fault.
+/// The shape (`None` for an empty element), or its error.
 fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, String> {
     let Some(form) = child(node, "geometry").and_then(|node| node.children().find(Node::is_element)) else {
         return Ok(None);

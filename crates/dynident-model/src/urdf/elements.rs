@@ -12,7 +12,7 @@ use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// Position limit, rad or m, that means an unknown limit: no joint of a robot has such a range.
+/// A position limit of this size, rad or m, or more is treated as unknown: no joint of a robot has such a range.
 pub(super) const UNKNOWN_POSITION: f64 = 1.0e3;
 
 pub(super) struct LinkElement<'a, 'input> {
@@ -163,7 +163,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     Ok(element)
 }
 
-/// `<inertial>`: mass, centre of mass, and inertia about it in axes rotated by the origin's rpy.
+/// `<inertial>`: mass, centre of mass, and inertia about the centre of mass in axes that the origin's rpy rotates.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
     const HINT: &str = ", or delete <inertial> so that the link is treated as unknown";
     let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
@@ -172,7 +172,7 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     let [xx, xy, xz, yy, yz, zz] = stated_moments(element)?;
     let at_com = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let r = &link_from_com.rotation;
-    // Without a rotation the numbers stay exact.
+    // Without a rotation the numbers are not changed by rounding.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
 }
@@ -202,7 +202,7 @@ fn only_inertial<'a, 'input>(node: Node<'a, 'input>, link: &str) -> Result<Optio
     }
 }
 
-/// Notes children that are not `known`, or that repeat an element of which only the first is read.
+/// Notes child elements that are not in `known`, and repeated elements of which only the first is read.
 fn note_unread<'a, 'input>(node: Node<'a, 'input>, known: &[&str], unread: &mut Unread<'a, 'input>) {
     let mut once = Vec::new();
     for child in node.children().filter(Node::is_element) {

@@ -12,10 +12,10 @@ use dynident_text::xml::{comment, escaped};
 /// the result gives the same model, except for these limitations of URDF: gravity is lost; a mimic joint with two
 /// sources is described in a comment.
 ///
-/// Unknown limits are written with a comment, because URDF readers use zero for missing limits: unknown positions of a
-/// revolute or prismatic joint as ±1000 rad or m, which the reader treats as unknown again, an unknown velocity or
-/// effort as 0 where the format requires one. A joint stays `revolute`, because readers such as Pinocchio describe the
-/// position of a `continuous` joint by two numbers.
+/// Unknown limits are written with a comment, because URDF readers use zero for missing limits. Unknown position
+/// limits of a revolute or prismatic joint are written as ±1000 rad or m, which this crate's reader treats as unknown
+/// again. An unknown velocity or effort is written as 0 where the format requires a value. A joint remains
+/// `revolute`, because readers such as Pinocchio represent the position of a `continuous` joint by two numbers.
 ///
 /// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
 pub fn write_urdf(model: &Model) -> String {
@@ -34,8 +34,8 @@ pub fn write_urdf(model: &Model) -> String {
     text + "</robot>\n"
 }
 
-/// Writes the links of a body; the other links are connected to the first one by fixed joints. The first link of the
-/// base carries everything fixed.
+/// Writes the links of a body; fixed joints connect the other links to the first one. The first link of the base
+/// carries everything that is fixed.
 fn write_links(text: &mut String, body: &Body, is_base: bool) {
     for (number, link) in body.links.iter().enumerate() {
         let name = escaped(&link.name);
@@ -129,7 +129,7 @@ fn origin(placement: &Transform) -> String {
     format!("<origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"{roll:?} {pitch:?} {yaw:?}\"/>")
 }
 
-/// Angles of [`Mat3::from_roll_pitch_yaw`]. At a pitch of ±90° only the sum of the other angles is defined, and roll is
+/// Angles of [`Mat3::from_roll_pitch_yaw`]. At a pitch of ±90° only the sum of roll and yaw is defined, and roll is
 /// set to zero.
 fn roll_pitch_yaw(r: &Mat3) -> [f64; 3] {
     let r = &r.0;

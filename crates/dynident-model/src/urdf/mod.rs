@@ -1,10 +1,10 @@
 //! URDF, the Unified Robot Description Format: reading and writing back.
 //!
-//! Supported are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
-//! Links connected by fixed joints are merged: [`Body::links`](crate::Body) keeps every link with its frame. A link
-//! without `<inertial>` is unknown, not massless. A joint with `mimic` is not a degree of freedom. Joints are ordered
-//! depth first, in the order of the document under each link. The rotation of `<origin>` is `rpy` or (URDF 1.1)
-//! `quat_xyzw`.
+//! Supported are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed
+//! base. Links connected by fixed joints are merged: [`Body::links`](crate::Body) keeps every link with its frame. A
+//! link without `<inertial>` has unknown mass; it is not massless. A joint with `mimic` is not a degree of freedom.
+//! Joints are ordered depth first, in the order of the document under each link. The rotation of `<origin>` is `rpy`
+//! or (URDF 1.1) `quat_xyzw`.
 //!
 //! ```
 //! let text = r#"<robot name="pendulum">

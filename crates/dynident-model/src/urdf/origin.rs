@@ -5,8 +5,8 @@ use super::{UrdfError, UrdfFault, fault_at};
 use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 
-/// `<origin xyz rpy>` or, in URDF 1.1, `<origin xyz quat_xyzw>`; the identity if missing. Both at once are an error, as
-/// in the reference parser.
+/// Reads `<origin xyz rpy>` or, in URDF 1.1, `<origin xyz quat_xyzw>`; the identity if missing. `rpy` together with
+/// `quat_xyzw` is an error, as in the reference parser.
 pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());

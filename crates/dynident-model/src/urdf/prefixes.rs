@@ -1,6 +1,6 @@
 //! Undeclared namespace prefixes (`<gazebo:plugin>`): the XML parser rejects them, but other URDF readers ignore
-//! namespaces. Their colon is replaced by an underscore, so that every byte keeps its place and no such name is one of
-//! URDF's.
+//! namespaces. Their colon is replaced by an underscore, so that every byte keeps its position and the new name
+//! differs from all names of URDF.
 
 use crate::xml::{outside_quotes, tags};
 use std::borrow::Cow;
@@ -10,13 +10,13 @@ use std::collections::HashSet;
 const MAX_PREFIXES: usize = 100;
 
 pub(super) struct Undeclared<'a> {
-    /// Byte position of its first occurrence.
+    /// Byte position of the first occurrence of the prefix.
     pub(super) at: usize,
     pub(super) prefix: &'a str,
 }
 
 /// Replaces the colon after every undeclared prefix by an underscore, and returns the prefixes in the order of the
-/// text. Needs one pass; malformed markup is left to the parser, and xacro has a separate error.
+/// text. One pass is sufficient. The parser reports malformed markup, and xacro has a separate error.
 pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_>>) {
     let declared: HashSet<&str> = text.match_indices("xmlns:").map(|(at, key)| name(&text[at + key.len()..])).collect();
     let known = |prefix: &str| matches!(prefix, "" | "xml" | "xmlns" | "xacro") || declared.contains(prefix);
@@ -44,7 +44,7 @@ pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_
     (Cow::Owned(replaced), found)
 }
 
-/// Calls `take` with the place of every prefix in the name of an element or attribute.
+/// Calls `take` with the position of every prefix in the name of an element or attribute.
 fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
     for (start, tag) in tags(text) {
         // Start of the current name.

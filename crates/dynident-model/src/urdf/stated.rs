@@ -21,7 +21,7 @@ pub struct StatedInertial {
     pub mass_kg: f64,
     /// Centre of mass in the link's frame, m: `xyz` of `<origin>`.
     pub com_m: [f64; 3],
-    /// `link_from_inertial`: axes of the moments.
+    /// `link_from_inertial`: rotation of the axes in which the moments are given.
     pub axes: Mat3,
     /// Moments about the centre of mass, kg m², in the order [`MOMENT_NAMES`].
     pub moments: [f64; 6],
@@ -69,8 +69,8 @@ pub fn stated_inertials(text: &str) -> Result<Vec<StatedInertial>, UrdfError> {
 }
 
 /// Writes the numbers of `<inertial>` that differ between `from` and `to` into `original` and keeps all other bytes.
-/// `from` are its [`stated_inertials`], `to` the same links in the same order. If only the sign of a number changes,
-/// its digits are kept; other numbers have the shortest form that parses to the same `f64`.
+/// `from` contains the [`stated_inertials`] of `original`, `to` the same links in the same order. If only the sign of
+/// a number changes, its digits are kept; other numbers have the shortest form that parses to the same `f64`.
 ///
 /// # Errors
 /// An invalid original, a link of `to` that is not in it, or a number that is not finite.

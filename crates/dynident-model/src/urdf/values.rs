@@ -5,7 +5,8 @@ use crate::place::Located;
 use crate::xml::{parse_number, shortened};
 use roxmltree::{Attribute, Node};
 
-/// The first child called `element`. Repetitions are reported as unread; the reference parser of URDF ignores them.
+/// The first child called `element`. Repetitions are reported as ignored, because the reference parser of URDF
+/// ignores them, too.
 pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(element))
 }
@@ -33,7 +34,7 @@ pub(super) fn name<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'
     Ok(found.value())
 }
 
-/// `N` numbers separated by spaces, each of at most [`MAX_MAGNITUDE`]; `None` without the attribute.
+/// Reads `N` numbers separated by spaces, each of at most [`MAX_MAGNITUDE`]; `None` without the attribute.
 pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Result<Option<[f64; N]>, UrdfError> {
     let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
     refuse_xacro(node, found)?;
@@ -59,7 +60,7 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
     Ok(Some(numbers))
 }
 
-/// One finite number of any magnitude (limits such as `1e16` mean "unlimited"); `None` without the attribute.
+/// Reads one finite number of any magnitude (limits such as `1e16` mean "unlimited"); `None` without the attribute.
 pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
     let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
     refuse_xacro(node, found)?;

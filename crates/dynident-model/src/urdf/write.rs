@@ -1,9 +1,10 @@
 //! Writes identified values into an existing URDF.
 //!
-//! Only `<inertial>` and the two friction values of `<dynamics>` change; all other bytes stay, except invisible
-//! characters, which become character references ([`dynident_text::xml::document`]). A body consists of links that are
-//! fixed to each other, and a log cannot distinguish them: [`link_changes`] assigns the whole body to the joint's own
-//! link, removes the `<inertial>` of the links fixed to it, and adds a comment.
+//! Only `<inertial>` and the two friction values of `<dynamics>` change. All other bytes are kept, except invisible
+//! characters, which become character references ([`dynident_text::xml::document`]). A body consists of links that
+//! are fixed to each other, and a log cannot distinguish these links. [`link_changes`] therefore assigns the inertial
+//! of the whole body to the joint's child link, removes the `<inertial>` of the links fixed to it, and adds a
+//! comment.
 
 use super::prefixes::without_undeclared;
 use super::{MAX_MAGNITUDE, UrdfError, parse};
@@ -29,7 +30,7 @@ pub enum LinkChange {
         /// A comment inside `<inertial>`.
         note: Option<String>,
     },
-    /// Removes the `<inertial>` of a link, which becomes unknown.
+    /// Removes the `<inertial>` of a link, whose inertia is then unknown.
     Remove {
         /// Name of the link.
         link: String,
@@ -91,9 +92,9 @@ pub enum UrdfWriteError {
     Counts { expected: usize, found: usize },
 }
 
-/// The changes that give every moving body of `model` the parameters `inertials` (body frames, one per joint): the
-/// joint's own link gets all of them, and the links fixed to it lose their `<inertial>`. Reading and merging the result
-/// gives exactly the new parameters.
+/// Returns the changes that give every moving body of `model` the parameters `inertials` (body frames, one per
+/// joint). The joint's child link gets all of them, and the links fixed to it lose their `<inertial>`. Reading the
+/// result and merging the links gives exactly the new parameters.
 ///
 /// # Errors
 /// A different count.
@@ -130,12 +131,12 @@ pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<V
 }
 
 /// Writes the changes into `original` and keeps all other bytes. Inertia is written about the centre of mass in axes
-/// parallel to the link's (rpy = 0). Every number has the shortest form that parses to the same `f64`.
+/// parallel to those of the link (rpy = 0). Every number has the shortest form that parses to the same `f64`.
 ///
 /// # Errors
 /// An invalid URDF, an unknown or repeated link or joint, a value that is not finite, or moments without mass.
 pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, UrdfWriteError> {
-    // It has the same length, so that its places apply to the original.
+    // The replaced text has the same length, so positions in it are valid in the original.
     let (regular, _) = without_undeclared(original);
     let document = parse(&regular)?;
     let robot = document.root_element();
@@ -180,7 +181,7 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
     Ok(edited(original, edits))
 }
 
-/// `<inertial>` about the centre of mass, in axes parallel to the link's.
+/// Lines of an `<inertial>` about the centre of mass, in axes parallel to those of the link.
 pub(super) fn inertial_lines(
     link: &str,
     inertial: &InertialParameters,
@@ -221,7 +222,7 @@ pub(super) fn inertial_lines(
     Ok(lines)
 }
 
-/// Writes the two friction values of one joint into its `<dynamics>`, or into a new one.
+/// Writes the two friction values of one joint into its `<dynamics>`, or into a new `<dynamics>`.
 fn friction(
     source: &Source<'_>,
     joint: Node<'_, '_>,

@@ -5,10 +5,10 @@ use roxmltree::Node;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Replaces parts of `original`. The parts must not overlap; all other bytes stay, except invisible characters, which
-/// become references and escape sequences ([`dynident_text::xml::document`]).
+/// Replaces parts of `original`. The parts must not overlap. All other bytes are kept, except invisible characters,
+/// which become references and escape sequences ([`dynident_text::xml::document`]).
 pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
-    // An insertion at the same place precedes a replacement.
+    // An insertion comes before a replacement at the same position.
     edits.sort_by_key(|(range, _)| (range.start, range.end));
     let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
     let mut done = 0;
@@ -24,7 +24,7 @@ pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> 
     }
 }
 
-/// A line of a new element, with its depth below the element's own indentation.
+/// A line of a new element, with its depth relative to the element's indentation.
 pub(crate) type Line = (usize, String);
 
 pub(crate) struct Source<'a> {
@@ -51,7 +51,7 @@ impl Source<'_> {
         let child = node.children().find(Node::is_element).and_then(|child| self.indentation(child.range().start));
         match child.and_then(|child| child.strip_prefix(own)) {
             Some(step) if !step.is_empty() => step.to_owned(),
-            // Links are children of the root, so that their indentation is one step.
+            // Links are children of the root, so the indentation of a link is one step.
             _ if !own.is_empty() && node.parent_element().is_some_and(|parent| parent.has_tag_name("robot")) => {
                 own.to_owned()
             }
@@ -69,7 +69,7 @@ impl Source<'_> {
         lines.iter().map(|(_, line)| line.as_str()).collect()
     }
 
-    /// Replaces the old element; on one line if the old one was on one line.
+    /// Replaces the old element; the new one is on one line if the old one was.
     pub(crate) fn replacement(&self, old: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
         let range = old.range();
         let new = match self.indentation(range.start) {

@@ -1,4 +1,4 @@
-//! Converts errors of the XML parser, with their place.
+//! Converts errors of the XML parser, with their positions.
 
 use roxmltree::{Error, TextPos};
 
@@ -10,7 +10,7 @@ pub(crate) enum Malformed {
     TooLarge,
     /// The markup is faulty.
     Markup {
-        /// Message of the parser, without the place.
+        /// Message of the parser, without the position.
         reason: String,
     },
 }
@@ -24,7 +24,7 @@ pub(crate) fn malformed(text: &str, error: &Error) -> (usize, Malformed) {
             (text.len(), Malformed::Markup { reason: "the document ends too early".to_owned() })
         }
         Error::NodesLimitReached => (0, Malformed::TooLarge),
-        // The parser's messages contain their position; ours start with it.
+        // The parser's messages contain their position; Dynident's messages start with it.
         _ => (byte_of(text, at), Malformed::Markup { reason: error.to_string().replacen(&format!(" at {at}"), "", 1) }),
     }
 }

@@ -23,7 +23,7 @@ pub(crate) fn root_name(text: &str) -> Option<&str> {
         rest = &rest[rest.find('<')?..];
         match length_beside_elements(rest) {
             Some(length) => rest = &rest[length..],
-            // A document type declaration, which the parser rejects.
+            // Skips a document type declaration; the parser rejects it later.
             None if rest.starts_with("<!") => rest = &rest[2..],
             None => break,
         }

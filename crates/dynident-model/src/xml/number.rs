@@ -1,12 +1,12 @@
 //! Numbers in robot descriptions.
 
-/// Parses a finite number in decimal or exponent notation; the error is the problem and the fix.
+/// Parses a finite number in decimal or exponent notation. The error contains the problem and the fix.
 pub(crate) fn parse_number(word: &str) -> Result<f64, (&'static str, &'static str)> {
     const PLAIN: &str = "a plain number such as 0.25";
     if word.contains(',') {
         return Err(("not a number", "a dot for the decimal comma and spaces between numbers"));
     }
-    // Rust also accepts `inf` and `nan`, so only digits, signs, dots and exponents are allowed.
+    // Rust also accepts `inf` and `nan`, so only digits, signs, decimal points and exponents are allowed.
     let looks_numeric =
         word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E'));
     match word.parse::<f64>() {
@@ -16,7 +16,7 @@ pub(crate) fn parse_number(word: &str) -> Result<f64, (&'static str, &'static st
     }
 }
 
-/// At most forty characters of foreign text, so that a message stays on one line.
+/// Shortens a text from a file to at most forty characters, so that a message stays on one line.
 pub(crate) fn shortened(text: &str) -> String {
     let mut short: String = text.chars().take(40).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(40).is_some() {

@@ -16,7 +16,7 @@ pub struct ComputedTorqueSettings {
     pub kp: PerJoint,
     /// K_d, 1/s; `2 √K_p` is critical damping.
     pub kd: PerJoint,
-    /// Compensated friction of the model; default at the velocity of the reference.
+    /// Velocity at which the friction of the model is compensated; default the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -32,8 +32,9 @@ impl ComputedTorqueSettings {
     }
 }
 
-/// `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction`: with an exact model the error of every joint satisfies `ë +
-/// K_d ė + K_p e = 0` (Luh, Walker and Paul 1980).
+/// Control law `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction` with the model's mass matrix M̂ and the
+/// Coriolis, centrifugal and gravity torque ĥ. With an exact model the error e of every joint satisfies `ë + K_d ė +
+/// K_p e = 0` (Luh, Walker and Paul 1980).
 #[derive(Clone, Debug)]
 pub struct ComputedTorque {
     model: ControllerModel,

@@ -1,4 +1,5 @@
-//! Finite-time controller of the paper: computed torque with fractional powers of the errors.
+//! Finite-time controller of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function* ("the
+//! paper" below): computed torque with fractional powers of the errors.
 
 use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target};
 use crate::error::{SimulationError, require};
@@ -26,7 +27,7 @@ pub struct FiniteTimeSettings {
     /// Velocity error below which the power is replaced by a line, rad/s (m/s); default 1e-2.
     #[serde(default = "blend_speed")]
     pub blend_speed: f64,
-    /// Compensated friction of the model; default at the velocity of the reference.
+    /// Velocity at which the friction of the model is compensated; default the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -44,7 +45,7 @@ fn blend_speed() -> f64 {
 }
 
 impl FiniteTimeSettings {
-    /// Settings with these gains and default values otherwise.
+    /// Creates settings with these gains and default values otherwise.
     pub fn with_gains(kp: impl Into<PerJoint>, kd: impl Into<PerJoint>) -> Self {
         Self {
             kp: kp.into(),
@@ -74,13 +75,14 @@ impl FiniteTimeSettings {
 
 /// `τ = M̂(q)(q̈_d + K_p Sig(e)^α₁ + K_d Sig(ė)^α₂) + Ĉ q̇ + ĝ`, `Sig(x)^α = |x|^α sign(x)`, `e = q_d - q`.
 ///
-/// Eq. 23 of the paper with two corrected signs (as printed, with `e = q_d - q`, the feedback is positive:
-/// [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, which is misprinted in the paper. With an exact model in
-/// continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
+/// This is Eq. 23 of the paper (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*)
+/// with two corrected signs and `α₂ = 2 α₁/(1 + α₁)`, which is misprinted there. With the printed signs and `e = q_d
+/// - q` the feedback is positive (see [`literal`](Self::literal)). With an exact model in continuous time the errors
+/// vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
 ///
-/// The gain `K_p |e|^(α-1)` is infinite at zero, so that a sampled law ends in a limit cycle of about `(K_p
-/// dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the line `ε^(α-1) x`, which is continuous at ε
-/// and as stiff as the power there.
+/// The gain `K_p |e|^(α-1)` is infinite at zero error, so that a sampled controller ends in a limit cycle of about
+/// `(K_p dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the line `ε^(α-1) x`, which is
+/// continuous at ε and as stiff as the power there.
 #[derive(Clone, Debug)]
 pub struct FiniteTime {
     model: ControllerModel,
@@ -91,7 +93,7 @@ pub struct FiniteTime {
     acceleration: Vec<f64>,
 }
 
-/// `Sig(x)^α` with a linear middle.
+/// `Sig(x)^α`, with a line near zero.
 #[derive(Clone, Copy, Debug)]
 struct Power {
     alpha: f64,
@@ -129,7 +131,7 @@ impl FiniteTime {
         })
     }
 
-    /// The law with the minus signs of Eq. 23, which is unstable; for demonstration.
+    /// Creates the controller with the minus signs printed in Eq. 23, which is unstable; for demonstration.
     ///
     /// # Errors
     /// Errors of [`FiniteTimeSettings::validate`].

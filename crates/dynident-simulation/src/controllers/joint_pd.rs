@@ -32,7 +32,7 @@ impl JointPdSettings {
     }
 }
 
-/// `τ = K_p (q_d - q) + K_d (q̇_d - q̇)`, without a model.
+/// Control law `τ = K_p (q_d - q) + K_d (q̇_d - q̇)`, without a model.
 #[derive(Clone, Debug)]
 pub struct JointPd {
     gains: [Vec<f64>; 2],

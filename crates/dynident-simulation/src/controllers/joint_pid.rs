@@ -1,4 +1,4 @@
-//! Joint PD with the integral of the error, as in many drives.
+//! Joint PID: PD with the integral of the position error, as in many drives.
 
 use super::{Controller, Measured, Target};
 use crate::error::SimulationError;
@@ -33,7 +33,7 @@ impl JointPidSettings {
     }
 }
 
-/// `τ = K_p e + K_i ∫ e dt + K_d ė` with `e = q_d - q`; trapezoidal integration between samples.
+/// Control law `τ = K_p e + K_i ∫ e dt + K_d ė` with `e = q_d - q`; trapezoidal integration between samples.
 #[derive(Clone, Debug)]
 pub struct JointPid {
     gains: [Vec<f64>; 3],

@@ -21,7 +21,7 @@ pub use slotine_li::{SlotineLi, SlotineLiSettings};
 use crate::error::SimulationError;
 use serde::{Deserialize, Serialize};
 
-/// Target of a joint controller at one time: rad, rad/s, rad/s² (m).
+/// Desired motion of all joints at one time; units rad, rad/s, rad/s² (m).
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
     /// Positions.
@@ -32,7 +32,7 @@ pub struct Target<'a> {
     pub ddq: &'a [f64],
 }
 
-/// Measurement of a joint controller at one time: rad, rad/s (m).
+/// Measured motion of all joints at one time; units rad, rad/s (m).
 #[derive(Clone, Copy, Debug)]
 pub struct Measured<'a> {
     /// Positions.
@@ -91,18 +91,19 @@ pub enum ControllerSettings {
     PdGravity(JointPdSettings),
     /// [`ComputedTorque`]: `τ = M̂ (q̈_d + K_p e + K_d ė) + ĥ`.
     ComputedTorque(ComputedTorqueSettings),
-    /// [`FiniteTime`]: the paper's law with corrected signs.
+    /// [`FiniteTime`]: Eq. 23 of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*,
+    /// with corrected signs.
     FiniteTime(FiniteTimeSettings),
     /// [`FiniteTime`] with the signs as printed in Eq. 23, for demonstration: it is unstable.
     FiniteTimeLiteral(FiniteTimeSettings),
     /// [`SlotineLi`]: passivity-based, optionally adaptive.
     SlotineLi(SlotineLiSettings),
-    /// [`PositionLoop`]: the position loop of the robot's drives, with torque feed-forward or only with a path.
+    /// [`PositionLoop`]: the position loop inside the robot's drives, with or without torque feed-forward.
     PositionLoop(PositionLoopSettings),
 }
 
 impl ControllerSettings {
-    /// Name in files.
+    /// Name of the controller in files.
     pub fn name(&self) -> &'static str {
         match self {
             Self::JointPd(_) => joint_pd::NAME,
@@ -129,7 +130,8 @@ impl ControllerSettings {
         }
     }
 
-    /// Whether the control law is known; that of a robot's own loop is known only if its gains are stated.
+    /// Whether the control law is known. The law of the drives' own position loop is known only if the study contains
+    /// its gains.
     pub fn can_be_simulated(&self) -> bool {
         match self {
             Self::PositionLoop(settings) => settings.can_be_simulated(),

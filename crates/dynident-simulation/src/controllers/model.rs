@@ -14,10 +14,11 @@ use serde::{Deserialize, Serialize};
 pub enum FrictionCompensation {
     /// No friction compensation.
     None,
-    /// Velocity of the reference: no noise and no feedback by friction.
+    /// Velocity of the reference: it has no noise, and friction compensation causes no feedback.
     #[default]
     Reference,
-    /// Measured velocity: correct while the joint lags, but the sign of a noisy velocity chatters.
+    /// Measured velocity: correct also when the joint lags behind, but the friction torque chatters with the sign of
+    /// a noisy velocity.
     Measured,
 }
 
@@ -149,9 +150,9 @@ impl ControllerModel {
         self.memories.iter_mut().for_each(HysteresisState::restart);
     }
 
-    /// Computes `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, plus the torques of the terms.
-    /// Inertia, offset and declared torques are always included; declared torques use the measured motion, friction the
-    /// selected velocity.
+    /// Computes `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, plus the torques of the
+    /// terms. Inertia, offset and declared (user-defined) torques are always included and use the measured motion.
+    /// Friction uses the selected velocity.
     pub fn torque(
         &mut self,
         measured: Measured<'_>,

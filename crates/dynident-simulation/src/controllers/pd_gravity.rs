@@ -5,8 +5,8 @@ use crate::error::SimulationError;
 
 pub(super) const NAME: &str = "pd-gravity";
 
-/// `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error if ĝ is correct (Takegaki and Arimoto 1981). ĝ includes
-/// constant torques of the model's terms.
+/// Control law `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error if the gravity torque ĝ is correct
+/// (Takegaki and Arimoto 1981). ĝ includes constant torques of the model's terms.
 #[derive(Clone, Debug)]
 pub struct PdGravity {
     pd: JointPd,

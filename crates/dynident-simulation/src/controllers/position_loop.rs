@@ -29,12 +29,12 @@ fn fed_forward() -> bool {
 }
 
 impl PositionLoopSettings {
-    /// The drives' own loop without stated gains.
+    /// Settings of the drives' own loop, whose gains are not known.
     pub fn of_robot(feed_forward: bool) -> Self {
         Self { feed_forward, kp: None, kd: None }
     }
 
-    /// Checks the stated gains for a number of joints.
+    /// Checks the given gains for a number of joints.
     ///
     /// # Errors
     /// Gains that are negative or not finite, lists of the wrong length.
@@ -42,12 +42,12 @@ impl PositionLoopSettings {
         self.stated_gains().map_or(Ok(()), |gains| gains.validate(joints))
     }
 
-    /// Whether both gains are stated.
+    /// Whether both gains are given.
     pub fn can_be_simulated(&self) -> bool {
         self.kp.is_some() && self.kd.is_some()
     }
 
-    /// The stated gains; a missing one is zero.
+    /// The given gains; a missing gain is zero.
     fn stated_gains(&self) -> Option<JointPdSettings> {
         let none = || PerJoint::All(0.0);
         (self.kp.is_some() || self.kd.is_some()).then(|| JointPdSettings {

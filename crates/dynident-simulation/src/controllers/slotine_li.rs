@@ -19,10 +19,11 @@ pub struct SlotineLiSettings {
     pub lambda: PerJoint,
     /// K_D, Nm s/rad (N s/m).
     pub kd: PerJoint,
-    /// Adaptation gain Γ of every parameter, in the parameter's unit squared per joule. Default 0: no adaptation.
+    /// Adaptation gain Γ of every parameter. Its unit is the square of the parameter's unit per joule. Default 0: no
+    /// adaptation.
     #[serde(default)]
     pub gamma: f64,
-    /// Compensated friction of the model; default at the velocity of the reference.
+    /// Velocity at which the friction of the model is compensated; default the velocity of the reference.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -40,13 +41,14 @@ impl SlotineLiSettings {
     }
 }
 
-/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adaptation `θ̂'
-/// = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
+/// Control law `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with regressor Y, parameters θ̂, `s = ė + Λ e`, `q̇_r = q̇_d + Λ
+/// e` and `q̈_r = q̈_d + Λ ė`; adaptation `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
 ///
 /// `Y` contains `C(q, q̇) q̇_r` with C from the Christoffel symbols, so that `Ṁ - 2C` is skew-symmetric. This product
 /// is the symmetric bilinear form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with `c(w) =
-/// C(q, w) w`, that is a difference of two ordinary regressors. The adapted parameters (bodies, then terms) start from
-/// the model in every run. Load-dependent friction is omitted, because its torque is not linear in the parameters.
+/// C(q, w) w`. It is therefore computed as the difference of two ordinary regressors. The adapted parameters (bodies,
+/// then terms) start from the model in every run. Friction that depends on the transmitted torque is omitted, because
+/// its torque is not linear in the parameters.
 #[derive(Debug)]
 pub struct SlotineLi {
     start: ControllerModel,
@@ -88,7 +90,7 @@ impl SlotineLi {
         })
     }
 
-    /// Present adapted parameters: ten for each body, then one for each term.
+    /// Current values of the adapted parameters: ten for each body, then one for each term.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
@@ -107,7 +109,7 @@ impl SlotineLi {
         for joint in 0..joints {
             regressor[joint * columns..][..bodies].copy_from_slice(&y[joint * bodies..][..bodies]);
         }
-        // The half difference has neither gravity nor acceleration.
+        // The half difference of the velocities is evaluated without gravity and acceleration.
         mean.fill(0.0);
         let y = torque_regressor(weightless, workspace, measured.q, half, mean);
         for joint in 0..joints {
@@ -122,7 +124,7 @@ impl SlotineLi {
         let for_friction = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
         let as_measured = JointMotion { samples: 1, q: measured.q, dq: measured.dq, ddq: reference_acceleration };
         for (place, ((term, _), memory)) in start.terms().iter().zip(memories).enumerate() {
-            // A load would make the column depend on the other parameters.
+            // A dependence on the transmitted torque would make the column depend on the other parameters.
             if self.friction == FrictionCompensation::None && term.is_friction() || term.needs_load() {
                 continue;
             }

@@ -1,8 +1,9 @@
 //! Adaptive integration between two controller samples: Dormand and Prince's method of order 8(5,3) with error control,
 //! from the crate `differential-equations`.
 //!
-//! Friction as in the fixed Runge-Kutta method: the integration stops where a sliding unit comes to rest (found on the
-//! method's dense output) and restarts there.
+//! Friction is treated as in the fixed Runge-Kutta method: the integration stops where a sliding unit (a joint with
+//! dry friction, or joints coupled by it) comes to rest, and restarts there. The dense output of the method gives the
+//! instant.
 
 use super::equations::{Equations, StateView};
 use super::runge_kutta::{min_sliding_speed, set_at_rest};
@@ -12,7 +13,7 @@ use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::ode::{ODE, solve_ode};
 use differential_equations::prelude::{ControlFlag, Interpolation, Solout, Solution};
 
-/// Maximum number of stops between two samples; the rest is integrated by the implicit step.
+/// Maximum number of stops between two samples; after them an implicit step integrates the rest.
 const MAX_STOPS: usize = 64;
 
 /// Right-hand side for `y = [q, q̇]`, with the time since the sample.
@@ -61,7 +62,7 @@ impl Solout<f64, Vec<f64>> for Watch<'_> {
         let of = |y: &[f64]| min_sliding_speed(&equations, &y[self.dof..]);
         self.last.0 = t_curr;
         self.last.1.copy_from_slice(y_curr);
-        // A unit that starts from rest has a margin of zero; a crossing requires a positive value before.
+        // A unit that starts from rest has a margin of zero; a crossing requires a positive margin before.
         if of(y_curr) >= 0.0 || t_curr <= t_prev {
             return ControlFlag::Continue;
         }

@@ -53,7 +53,7 @@ impl TimeCourse {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "on", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Disturbance {
-    /// A torque (force) on one joint, Nm (N), in addition to that of the drive.
+    /// A torque (force) on one joint, Nm (N), in addition to the drive torque.
     Joint {
         /// Name of the joint.
         joint: String,
@@ -99,8 +99,9 @@ impl JointDisturbance {
         Ok(Self { joint: index, disturbance: disturbance.clone() })
     }
 
-    /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) ×
-    /// f)` of every revolute joint on the path, `axis · f` of a prismatic one.
+    /// Adds the joint torques (forces) of the disturbance at a time. A force f at the point p acts on the joints
+    /// between the base and its body: `axis · ((p - o) × f)` on a revolute joint with origin o, `axis · f` on a
+    /// prismatic joint.
     pub(super) fn add(&self, model: &Model, workspace: &mut Workspace, time_s: f64, q: &[f64], torque: &mut [f64]) {
         match &self.disturbance {
             Disturbance::Joint { torque: size, time, .. } => torque[self.joint] += size * time.at(time_s),

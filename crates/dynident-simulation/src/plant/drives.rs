@@ -5,8 +5,8 @@ use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
 use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm};
 
-/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, slipping springs,
-/// declared torques, and friction that depends on a velocity.
+/// Torque terms with their parameters: constants of the mass matrix and of the torque, linear damping, friction
+/// springs that slip, declared (user-defined) torques, and friction that depends on a velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
@@ -47,7 +47,7 @@ impl Drives {
             states: Vec::new(),
             by_load: false,
         };
-        // One unit for each joint, then those of drives that move with two joints.
+        // One unit for each joint, then one for each drive that moves with two joints.
         let mut own: Vec<FrictionUnit> = (0..dof).map(|joint| FrictionUnit::new(vec![(joint, 1.0)])).collect();
         let mut used = vec![false; dof];
         for (term, &value) in terms.iter().zip(parameters) {
@@ -79,7 +79,7 @@ impl Drives {
                 TermAction::State(_) => {
                     drives.states.extend(joints.iter().map(|&joint| StateTorque { joint, term: term.clone(), value }));
                 }
-                // Simulated drives have their reference temperature.
+                // Simulated drives are at their reference temperature, so this term has no effect.
                 TermAction::Temperature => {}
                 TermAction::Friction(friction) => {
                     if value < 0.0 {
@@ -102,8 +102,8 @@ impl Drives {
         Ok(drives)
     }
 
-    /// Subtracts the torques of slipping springs at positions `q` from `torque`. The deflection is that of the last
-    /// [`follow`](Self::follow), updated to `q`.
+    /// Subtracts the torques of the slipping friction springs at positions `q` from `torque`. The deflection is that
+    /// after the last [`follow`](Self::follow), updated to `q`.
     pub(super) fn subtract_springs(&self, q: &[f64], torque: &mut [f64]) {
         for spring in &self.springs {
             torque[spring.joint] -=
@@ -111,8 +111,8 @@ impl Drives {
         }
     }
 
-    /// Subtracts declared torques at positions `q` and velocities `dq` from `torque`. An undefined torque is NaN, so
-    /// that the motion ends.
+    /// Subtracts declared torques at positions `q` and velocities `dq` from `torque`. An undefined torque is NaN,
+    /// which ends the run.
     pub(super) fn subtract_declared(&self, q: &[f64], dq: &[f64], torque: &mut [f64]) {
         let motion = JointMotion { samples: 1, q, dq, ddq: dq };
         for state in &self.states {

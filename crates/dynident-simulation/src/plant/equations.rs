@@ -1,5 +1,7 @@
-//! Equation of motion of a simulated robot at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - k f(q, q̇) - F_v
-//! q̇ - Cᵀ f`.
+//! Equation of motion of a simulated robot at one state, `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - k f(q, q̇) -
+//! F_v q̇ - Cᵀ f`: mass matrix M, drive torques τ, disturbances d, Coriolis, centrifugal and gravity torque h,
+//! constant torques τ₀, declared torques k f(q, q̇), viscous friction F_v, and friction torques f of the units that C
+//! selects.
 
 use super::PlantFault;
 use super::disturbance::JointDisturbance;
@@ -15,7 +17,7 @@ pub(super) enum Mode {
     /// Moving, or unable to hold: friction of this branch.
     Forward,
     Backward,
-    /// At rest: the torque that keeps it there.
+    /// At rest: friction is the torque that holds the unit there.
     Held,
 }
 
@@ -38,11 +40,11 @@ pub(super) struct Equations {
     matrix: Vec<f64>,
     /// Right-hand side, then accelerations.
     pub(super) acceleration: Vec<f64>,
-    /// Torque of the bodies at the last acceleration, the load of load-dependent friction.
+    /// Torque of the bodies at the last acceleration, for friction that depends on the transmitted torque.
     load: Vec<f64>,
-    /// `M⁻¹ c_u` of every unit.
+    /// `M⁻¹ c_u` of every friction unit u: accelerations per unit of its friction torque.
     responses: Vec<f64>,
-    /// `C M⁻¹ Cᵀ` of the chosen units.
+    /// `C M⁻¹ Cᵀ` of the chosen units, their inverse inertia.
     compliance: Vec<f64>,
     free: Vec<f64>,
     pub(super) solver: FrictionSolver,
@@ -111,7 +113,7 @@ impl Equations {
         let (mass_matrix, bias) = mass_matrix_and_bias(model, workspace, at.q, at.dq);
         matrix.copy_from_slice(mass_matrix);
         if drives.by_load {
-            // Uses the accelerations of the previous evaluation.
+            // Uses the accelerations of the previous evaluation for friction that depends on the transmitted torque.
             for j in 0..n {
                 load[j] = bias[j] + (0..n).map(|k| matrix[j * n + k] * acceleration[k]).sum::<f64>();
             }
@@ -165,14 +167,14 @@ impl Equations {
         }
     }
 
-    /// Accelerations without the friction of units that was not subtracted.
+    /// Solves for the accelerations; only friction that was already subtracted is included.
     #[inline]
     pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
         let n = self.acceleration.len();
         if factor_and_solve(&mut self.matrix, n, &mut self.acceleration) { Ok(()) } else { Err(PlantFault::MassMatrix) }
     }
 
-    /// Chooses the units for the next calls; returns their number.
+    /// Chooses the units for the following calls; returns their number.
     pub(super) fn choose(&mut self, wanted: impl Fn(&FrictionUnit, Mode) -> bool) -> usize {
         self.chosen.clear();
         for (index, unit) in self.drives.units.iter().enumerate() {
@@ -204,8 +206,9 @@ impl Equations {
         }
     }
 
-    /// Applies friction of the chosen units such that `w = start + factor · acceleration` belongs to their maps.
-    /// `start` contains the joint velocities, `None` for zero. With `jumps` only the jumps of the maps are used.
+    /// Applies friction torques f of the chosen units that satisfy their friction laws at the velocities `w = start +
+    /// factor · acceleration`. `start` contains the joint velocities, `None` for zero. With `jumps`, only the jumps
+    /// at zero velocity are used.
     pub(super) fn apply_friction(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
         let count = self.chosen.len();
         self.couple();
@@ -247,8 +250,8 @@ impl Equations {
         let count = self.choose(|_, mode| mode == Mode::Held);
         if count > 0 {
             self.couple();
-            // If a joint and a drive that moves with it are both held, their torques are not unique; the regularised
-            // diagonal distributes them.
+            // If a joint and a drive that moves with it are both at rest, the division of the torque between them is
+            // not unique; the regularised diagonal distributes it.
             for place in 0..count {
                 self.compliance[place * count + place] *= 1.0 + 1e-13;
                 self.solver.torque[place] = self.drives.units[self.chosen[place]].speed(&self.acceleration);
@@ -266,8 +269,8 @@ impl Equations {
         Ok(())
     }
 
-    /// Determines the held units: those at rest (`w = 0`, or held before) whose friction suffices. Returns whether any
-    /// unit can hold.
+    /// Determines which units friction holds: units at rest (`w = 0`, or held before) whose friction is sufficient.
+    /// Returns whether friction can hold any unit.
     pub(super) fn decide(&mut self, at: StateView<'_>) -> Result<bool, PlantFault> {
         let mut at_rest = false;
         for (unit, mode) in self.drives.units.iter().zip(&mut self.modes) {

@@ -1,8 +1,9 @@
-//! Semi-implicit Euler: the joints move with the new velocities.
+//! Semi-implicit Euler method: positions are integrated with the new velocities.
 //!
-//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`. Viscous friction is implicit as in
-//! MuJoCo's Euler integrator, and all other friction is implicit too, with `f` in the map of the velocities after the
-//! step. Dry friction therefore neither chatters nor creates energy, for any step size.
+//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'` with step length h. Viscous friction
+//! F_v is implicit as in MuJoCo's Euler integrator. All other friction f is implicit too: it satisfies the friction
+//! law at the velocities after the step. Dry friction therefore neither chatters nor creates energy, for any step
+//! length.
 
 use super::equations::{Equations, StateView};
 use super::{PlantFault, State};

@@ -9,7 +9,7 @@ pub(super) fn factor(a: &mut [f64], n: usize) -> bool {
     factor_over(a, n, is_pivot)
 }
 
-/// [`factor`] for other scalars; returns false if `is_pivot`, which is called for every pivot, returned false.
+/// Like [`factor`], for other scalars. Calls `is_pivot` for every pivot and returns false if any call returned false.
 #[inline(always)]
 pub(super) fn factor_over<T: Scalar>(a: &mut [T], n: usize, is_pivot: impl FnMut(T) -> bool) -> bool {
     // Arms have six or seven joints. With a constant size the compiler unrolls the loops.
@@ -70,8 +70,8 @@ fn factor_of_any_size<T: Scalar>(a: &mut [T], n: usize, mut is_pivot: impl FnMut
     fine
 }
 
-/// [`factor`] and [`solve`] together, with identical results; the right-hand side is processed during the divisions of
-/// a column.
+/// Does [`factor`] and [`solve`] together, with identical results; the right-hand side is processed during the
+/// divisions of a column.
 #[inline]
 pub(super) fn factor_and_solve(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
     match n {
@@ -136,7 +136,7 @@ pub(super) fn solve<T: Scalar>(l: &[T], n: usize, b: &mut [T]) {
                 }
             }
             for i in (0..n).rev() {
-                // The initial value of the standard library's sums.
+                // The standard library starts its sums with this value.
                 let mut sum = T::splat(-0.0);
                 for k in i + 1..n {
                     sum += l[k * n + i] * b[k];
@@ -168,8 +168,8 @@ fn solve_of<T: Scalar, const N: usize>(l: &[T], b: &mut [T]) {
     }
 }
 
-/// [`solve`] of several right-hand sides, one after another in `b`, with identical results. A single one is a chain of
-/// dependent steps; several together use the processor better.
+/// Does [`solve`] for several right-hand sides, stored one after another in `b`, with identical results. A single
+/// solution is a chain of dependent steps; several together use the processor better.
 #[inline]
 pub(super) fn solve_all(l: &[f64], n: usize, b: &mut [f64]) {
     match n {

@@ -1,10 +1,10 @@
 //! Solver for the friction torques of all units.
 //!
-//! Velocities (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and
-//! every torque belongs to the map of its unit: `f_u ∈ f_u(w_u)`, with a jump at rest (implicit time stepping of dry
-//! friction: Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is
-//! positive (semi-)definite and the maps are monotone. The velocities are therefore unique, friction is dissipative,
-//! and a unit that its friction can hold stays exactly at rest.
+//! Velocities (or accelerations) after a step are `w = r - c A f`: r without friction, c a time factor, `A = C M⁻¹
+//! Cᵀ` the inverse inertia of the units. Every friction torque satisfies the law of its unit, `f_u ∈ f_u(w_u)`, with
+//! a jump at rest (implicit time stepping of dry friction: Moreau 1988; Acary and Brogliato, *Numerical Methods for
+//! Nonsmooth Dynamical Systems*, 2008). `A` is positive (semi-)definite and the laws are monotone. The velocities are
+//! therefore unique, friction is dissipative, and a unit that its friction can hold stays exactly at rest.
 //!
 //! Newton's method on the set of units at rest is used while it reduces the error; otherwise Gauss-Seidel sweeps, which
 //! always converge because they descend in a convex function.
@@ -34,11 +34,11 @@ impl FrictionSolver {
         Self { torque: zeros(), speed: zeros(), trial: zeros(), matrix: vec![0.0; units * units] }
     }
 
-    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. Returns false if the torques did not converge; they are within their
-    /// maps in any case.
+    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. Returns false if the torques did not converge; they satisfy the
+    /// limits of their friction laws in any case.
     ///
-    /// `chosen` contains indices into `units`; `a` and `r` are in the order of `chosen`. With `jumps` only the jumps of
-    /// the maps are used.
+    /// `chosen` contains indices into `units`; `a` and `r` are in the order of `chosen`. With `jumps`, only the jumps
+    /// of the friction laws at zero velocity are used.
     pub(super) fn solve(
         &mut self,
         units: &[FrictionUnit],
@@ -67,8 +67,8 @@ impl FrictionSolver {
         false
     }
 
-    /// One pass over the units, each solved exactly with the present torques of the others. Returns the largest change,
-    /// as a velocity.
+    /// One pass over the units, each solved exactly with the current torques of the others. Returns the largest
+    /// change, as a velocity.
     fn sweep(&mut self, problem: &Problem<'_>) -> f64 {
         let mut change = 0.0_f64;
         for u in 0..problem.chosen.len() {
@@ -128,7 +128,7 @@ impl Problem<'_> {
         self.c * self.a[u * self.chosen.len() + u]
     }
 
-    /// Solution of unit `u` with the present torques of the others.
+    /// Solution of unit `u` with the current torques of the others.
     fn resolve(&self, u: usize, torque: &[f64]) -> FrictionParts {
         let n = self.chosen.len();
         let row = &self.a[u * n..(u + 1) * n];
@@ -138,7 +138,7 @@ impl Problem<'_> {
         if self.jumps { unit.resolve_jump(free, own) } else { unit.resolve(free, own) }
     }
 
-    /// Largest difference between a torque and the solution of its unit with the present torques, as a velocity.
+    /// Largest difference between a torque and the solution of its unit with the current torques, as a velocity.
     fn defect(&self, torque: &[f64]) -> f64 {
         (0..self.chosen.len())
             .filter(|&u| self.own(u) > 0.0)

@@ -9,20 +9,21 @@ struct Term {
     value: f64,
     by_load: bool,
     fading: Option<[f64; 2]>,
-    /// For a sign function (which at rest holds any torque up to the level): the directions in which it acts.
+    /// For a sign function (which at rest holds any torque up to its level): whether it acts in forward and backward
+    /// direction.
     step: Option<[bool; 2]>,
-    /// Value including load and Stribeck effect at the present state.
+    /// Current value, including the effects of transmitted torque and of velocity (Stribeck).
     size: f64,
 }
 
-/// All friction that depends on one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a
-/// joint is `ratio f`.
+/// All friction that depends on one velocity `w = Σ ratio q̇`: the friction law `w ↦ f(w)`, a range of torques at
+/// rest. The torque of a joint is `ratio f`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionUnit {
     /// Joints that determine the velocity, and their ratios.
     pub(super) joints: Vec<(usize, f64)>,
     terms: Vec<Term>,
-    /// Maximum friction at rest for forward and backward motion.
+    /// Maximum friction torque at rest against forward and backward motion.
     level: [f64; 2],
     steps: bool,
     smooth: bool,
@@ -33,7 +34,7 @@ pub(super) struct FrictionUnit {
 pub(super) struct FrictionParts {
     pub(super) speed: f64,
     pub(super) torque: f64,
-    /// Slope of the map at the velocity; `None` if the unit is at rest, held by the jump of the map.
+    /// Slope of the friction law at the velocity; `None` if friction holds the unit at rest.
     pub(super) slope: Option<f64>,
 }
 
@@ -67,7 +68,7 @@ impl FrictionUnit {
         self.steps
     }
 
-    /// Updates the size of Stribeck and load-dependent terms for this velocity and load.
+    /// Updates the size of Stribeck and load-dependent terms for this velocity and this transmitted torque.
     #[inline]
     pub(super) fn update(&mut self, speed: f64, load: f64) {
         let mut level = [0.0; 2];
@@ -108,7 +109,7 @@ impl FrictionUnit {
         sum
     }
 
-    /// Friction torque at `speed` on the forward or backward branch of the map, also if the velocity has just crossed
+    /// Friction torque at `speed` on the forward or backward branch of the law, also if the velocity has just crossed
     /// zero.
     #[inline]
     pub(super) fn sliding(&self, speed: f64, forward: bool) -> f64 {
@@ -116,7 +117,7 @@ impl FrictionUnit {
         jump + self.smooth(speed)[0]
     }
 
-    /// Solution of `w + c f(w) = r` for c > 0, which is unique because the map is monotone.
+    /// Solution of `w + c f(w) = r` for c > 0, which is unique because the friction law is monotone.
     pub(super) fn resolve(&self, r: f64, c: f64) -> FrictionParts {
         let at_jump = self.resolve_jump(r, c);
         let (rest, jump) = (at_jump.speed, at_jump.torque);
@@ -149,7 +150,7 @@ impl FrictionUnit {
         FrictionParts { speed, torque: jump + own[0], slope: Some(own[1].max(0.0)) }
     }
 
-    /// [`resolve`](Self::resolve) with the jump alone.
+    /// Like [`resolve`](Self::resolve), with only the jump of the friction law at zero velocity.
     #[inline]
     pub(super) fn resolve_jump(&self, r: f64, c: f64) -> FrictionParts {
         if self.steps && r <= c * self.level[0] && r >= -c * self.level[1] {

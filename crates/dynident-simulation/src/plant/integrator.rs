@@ -16,16 +16,16 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Integrator {
-    /// Semi-implicit Euler with implicit friction: order 1, without chatter. With viscous friction alone equal to
-    /// MuJoCo's `Euler`.
+    /// Semi-implicit Euler with implicit friction: order 1, without chatter. If viscous friction is the only
+    /// friction, it equals MuJoCo's `Euler`.
     SemiImplicitEuler {
         /// Number of equal steps between samples; default 1.
         #[serde(default = "one")]
         steps_per_sample: usize,
     },
-    /// Runge-Kutta of order 4 with explicit friction, which stops where a joint comes to rest; without friction equal
-    /// to MuJoCo's `RK4`. Steep smooth friction needs short steps: `h` times its slope divided by the joint's inertia
-    /// below 2.7.
+    /// Runge-Kutta of order 4 with explicit friction; it stops where a joint comes to rest. Without friction it
+    /// equals MuJoCo's `RK4`. Friction that changes steeply with velocity needs short steps: the step length times
+    /// the slope of friction divided by the joint's inertia must be below 2.7.
     Rk4 {
         /// Number of equal steps between samples; default 1.
         #[serde(default = "one")]

@@ -22,8 +22,9 @@ pub fn with_placements(
     Ok(changed.with_gravity(model.gravity())?)
 }
 
-/// A robot with manufacturing errors: every joint's placement has a normal error of `length_std_m` in each direction
-/// and of `angle_std_rad` about a random axis. The same seed results in the same robot.
+/// A robot with manufacturing errors: each joint's placement has a normally distributed position error with standard
+/// deviation `length_std_m` along every axis, and a rotation about a random axis with standard deviation
+/// `angle_std_rad`. The same seed results in the same robot.
 ///
 /// # Errors
 /// A standard deviation that is negative or not finite.

@@ -41,7 +41,7 @@ pub enum PlantFault {
     #[error("the motion of the simulated robot is not finite")]
     NotFinite,
     /// The simulated motion changes too fast for the integrator, for example because of very stiff friction or a very
-    /// high gain. Lower the gains, or use a wider step of friction.
+    /// high gain. Lower the gains, or use friction that changes less steeply around zero velocity.
     #[error("the adaptive integrator cannot keep its tolerance")]
     StepSize,
 }
@@ -61,10 +61,11 @@ impl State {
 
 /// A simulated robot: rigid bodies, drives and friction, disturbances, locked joints.
 ///
-/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Sign functions without smoothing (`CoulombShape::Sign`, its dead band
-/// ignored) are dry friction with stiction: a joint at rest stays exactly at rest until the other torques exceed its
-/// friction at rest (Coulomb and Stribeck together). A sign function of a drive that moves with two joints holds that
-/// drive. Load-dependent friction uses the load of the previous evaluation.
+/// Equation of motion `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`: mass matrix M, Coriolis, centrifugal and gravity
+/// torque h, drive torques τ and disturbances d. Sign functions without smoothing (`CoulombShape::Sign`; its dead
+/// band is ignored) are dry friction with stiction: a joint at rest stays exactly at rest until the other torques
+/// exceed its friction at rest (Coulomb and Stribeck together). The sign function of a drive that moves with two
+/// joints holds that drive. Load-dependent friction uses the transmitted torque of the previous evaluation.
 ///
 /// ```
 /// use dynident_simulation::{Integrator, Plant};
@@ -99,8 +100,8 @@ impl core::fmt::Debug for Plant {
 }
 
 impl Plant {
-    /// Creates the robot with the inertial parameters of the model and the terms with their parameters, at rest at
-    /// zero.
+    /// Creates the robot at rest at position zero, with the inertial parameters of the model and the terms with their
+    /// parameters.
     ///
     /// # Errors
     /// Different lengths, values that are not finite, negative friction or drive inertia, terms of missing joints, or a
@@ -183,7 +184,7 @@ impl Plant {
     }
 
     /// Number of steps in which the friction torques of several joints did not converge to 1e-13 of the largest
-    /// velocity. It has always been zero.
+    /// velocity. It is zero in all known cases.
     pub fn unsettled_steps(&self) -> usize {
         self.equations.unsettled
     }
@@ -222,8 +223,8 @@ impl Plant {
         Ok(())
     }
 
-    /// Computes the accelerations for the drives' torques in the present state, with friction; a joint at rest is held
-    /// as far as its friction suffices.
+    /// Computes the accelerations for the drives' torques in the current state, including friction. A joint at rest
+    /// stays at rest if its friction is sufficient.
     ///
     /// # Errors
     /// [`PlantFault`].

@@ -1,8 +1,9 @@
 //! Classical Runge-Kutta method of order 4 that stops where a joint comes to rest.
 //!
 //! During a step every friction unit slides in one direction or is held. If the velocity of a sliding unit crosses
-//! zero, the step ends there (found by false position on the step length), the unit is exactly at rest, and whether its
-//! friction holds it is determined again. Breakaway of a held unit is tested at the beginning of a step.
+//! zero, the step ends there (found by false position on the step length) with the unit exactly at rest. Then the
+//! method determines again whether friction holds the unit. Breakaway of a held unit is tested at the beginning of a
+//! step.
 
 use super::equations::{Equations, Mode, StateView};
 use super::{PlantFault, State, euler};
@@ -59,7 +60,7 @@ pub(super) fn step(
     euler::step(equations, state, tau, left_s)
 }
 
-/// One step of length `h` with every unit in its mode, into the next state of `stages`.
+/// One step of length `h` with the given mode (sliding or held) of every unit, into the next state of `stages`.
 fn try_step(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f64) -> Result<(), PlantFault> {
     let Stages { q, dq, speeds, accelerations, q_next, dq_next } = stages;
     equations.in_modes(at)?;
@@ -106,7 +107,7 @@ fn shortened_to_stop(
     if at_low <= 0.0 {
         return Ok(None);
     }
-    // Velocity that is treated as zero: rounding of the velocities at the start of the step.
+    // Velocities below this are treated as zero: rounding of the velocities at the start of the step.
     let zero_speed = 1e-13 * at_low.max(-at_high);
     let mut last_side = 0;
     for _ in 0..60 {
@@ -133,7 +134,7 @@ fn shortened_to_stop(
     Ok(Some(low))
 }
 
-/// Sets units at rest whose velocity in their direction is at most `zero_speed`.
+/// Sets units at rest if their velocity in sliding direction is at most `zero_speed`.
 pub(super) fn set_at_rest(equations: &mut Equations, dq: &mut [f64], zero_speed: f64) {
     for (unit, mode) in equations.drives.units.iter().zip(&mut equations.modes) {
         let speed = unit.speed(dq);

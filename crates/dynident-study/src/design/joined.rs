@@ -14,16 +14,17 @@ const NAME: &str = "joined";
 pub struct JoinedChoice {
     /// The parts in order, each with its own `kind` and settings; a part cannot be `joined`.
     pub parts: Vec<FamilyChoice>,
-    /// Relative durations of the parts, after the transitions are subtracted from the duration; equal by default.
+    /// Relative durations of the parts, after subtraction of the transitions from the total duration; equal by
+    /// default.
     #[serde(default)]
     pub shares: Option<Vec<f64>>,
     /// Duration of each transition, s; 2 by default.
     #[serde(default = "move_s")]
     pub move_s: f64,
-    /// Posture from which the experiment starts at rest, rad (m); by default it starts with the first part.
+    /// Posture at rest at which the experiment starts, rad (m); by default the start of the first part.
     #[serde(default)]
     pub start: Option<Vec<f64>>,
-    /// Posture at which it ends at rest; by default it ends with the last part.
+    /// Posture at rest at which the experiment ends, rad (m); by default the end of the last part.
     #[serde(default)]
     pub end: Option<Vec<f64>>,
 }

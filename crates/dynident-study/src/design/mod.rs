@@ -28,21 +28,22 @@ use name_or_table::name_or_table;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Longest motion of a 1.2 m arm, s: the final check evaluates the whole motion at 10 kHz.
+/// Longest motion of an arm of 1.2 m, s; the limit exists because the final check evaluates the whole motion at 10
+/// kHz.
 const MAX_DURATION_S: f64 = 3600.0;
 const MAX_DURATION_OF_ANY_ROBOT_S: f64 = 1e7;
 
-/// Maximum number of samples of the search grid and of the planned log.
+/// Maximum number of samples of the search grid, and of the planned log.
 const MAX_SAMPLES: f64 = 1e6;
 
 const MAX_STOP_MARGIN_PERCENT: f64 = 90.0;
 
 const MAX_CONTINUOUS_TURNS: f64 = 1e4;
 
-/// Maximum of starts, rounds and evaluations per start.
+/// Maximum number of starts, of rounds, and of evaluations per start.
 const MAX_COUNT: usize = 1_000_000;
 
-/// `[design]`; every key is optional.
+/// Section `[design]`; every key is optional.
 ///
 /// ```
 /// let section: dynident_study::DesignSection = toml::from_str(
@@ -74,7 +75,8 @@ pub struct DesignSection {
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub optimiser: OptimiserChoice,
-    /// Strokes of a windowed design, one per joint, which are evaluated without a search. Empty by default.
+    /// Logistic moves (strokes) of a step-wise design, one per joint, that are evaluated without a search. Empty by
+    /// default.
     pub parameters: Vec<GivenStroke>,
     /// Posture at the start, and at the end for a family that returns to its start; free by default.
     pub start_posture: Option<StartPosture>,
@@ -82,16 +84,16 @@ pub struct DesignSection {
     /// default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub payload: Option<String>,
-    /// Prior knowledge of the parameters; none by default.
+    /// Prior knowledge of the parameters; no prior by default.
     pub prior: PriorSection,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the order of the model. By
     /// default 1 % of the joint's effort limit, or 1 without an effort limit.
     pub torque_std_nm: Option<TorqueNoise>,
-    /// Effort and resolution of the search; also the sample rate of the log and the seed.
+    /// Effort and resolution of the search; also the sampling rate of the log and the seed.
     pub search: DesignSettings,
-    /// Limits, which override those of the robot description.
+    /// Limits; they replace those of the robot description.
     pub limits: Limits,
-    /// Assumed limits where neither `limits` nor the robot description gives one.
+    /// Selection of the limits that are assumed where neither `limits` nor the robot description defines a limit.
     pub defaults: AssumedLimits,
 }
 
@@ -127,22 +129,23 @@ pub enum FamilyChoice {
     Quintic(QuinticSettings),
     /// Sines with Schroeder phases.
     Multisine(MultisineSettings),
-    /// Any number of logistic strokes per joint.
+    /// Several logistic functions (smooth moves) per joint.
     LogisticStrokes(LogisticStrokesSettings),
-    /// The paper's spliced logistic function.
+    /// Logistic functions back and forth, as in *Iterative Identification of Robot Dynamic Parameters Based on
+    /// Logistic Function*.
     SplicedLogistic(SplicedLogisticSettings),
     /// Sweeps at constant velocity, for friction.
     FrictionLadder(FrictionLadderSettings),
     /// Postures held one after another, for gravity.
     StaticPostures(StaticPosturesSettings),
-    /// Code of the caller.
+    /// A motion function in code of the calling program.
     Function(FunctionChoice),
     /// Several families in sequence.
     Joined(JoinedChoice),
 }
 
 impl FamilyChoice {
-    /// The `kind` in study files and results.
+    /// Value of `kind` in study files and results.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Fourier(_) => "fourier",
@@ -158,7 +161,7 @@ impl FamilyChoice {
         }
     }
 
-    /// Names of the caller's functions that it or its parts use.
+    /// Names of the calling program's functions that the family or its parts use.
     pub fn functions(&self) -> Vec<String> {
         match self {
             Self::Function(own) => vec![own.function.clone()],
@@ -199,30 +202,33 @@ impl FamilyChoice {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CriterionChoice {
-    /// The volume of the confidence ellipsoid: `-log det D`.
+    /// D-optimality, the volume of the confidence ellipsoid: `-log det D` with the information matrix D.
     #[default]
     DOptimal,
-    /// The sum of the variances: `tr D⁻¹`.
+    /// A-optimality, the sum of the variances: `tr D⁻¹` with the information matrix D.
     AOptimal,
-    /// The largest variance of any direction: `1 / λ_min(D)`.
+    /// E-optimality, the largest variance of any direction: `1 / λ_min(D)` with the information matrix D.
     EOptimal,
     /// The condition number of the stacked base regressor, in SI units, all torques with equal weight.
     ConditionNumber,
-    /// The same after division of each column by its norm.
+    /// Condition number of the same matrix after division of each column by its norm.
     ConditionNumberScaled,
-    /// V-optimality: the mean square error of the torque that the fitted model will predict on a task.
+    /// V-optimality: the mean square error of the torque that the identified model will predict along a given motion
+    /// (the task).
     Prediction {
-        /// The task: a table with `t_s`, `q1..` and, if available, `dq1..` and `ddq1..` (rad, m, s), or positions under
-        /// the joint names. The path is resolved in the same way as those of the logs.
+        /// The motion along which torque will be predicted: a table with `t_s`, `q1..` and, if available, `dq1..` and
+        /// `ddq1..` (rad, m, s), or positions under the joint names. The path is resolved in the same way as those of
+        /// the logs.
         trajectory: PathBuf,
     },
-    /// The paper's sum of condition numbers over windows around the mid-points of logistic strokes.
+    /// Sum of the joints' condition numbers, each over time windows around the mid-points of its logistic moves
+    /// (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equation 19).
     WindowedCondition(WindowedCondition),
 }
 
 impl CriterionChoice {
-    /// The criterion in the forms that a search uses one after another: smooth first, then sharp. `None` for a task,
-    /// which has to be read first.
+    /// The criterion in the versions that a search uses one after another: smooth first, then sharp. `None` for a
+    /// prediction criterion, whose trajectory file has to be read first.
     pub fn criteria(&self) -> Option<Vec<Box<dyn Criterion>>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
             [40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
@@ -237,7 +243,7 @@ impl CriterionChoice {
         })
     }
 
-    /// Whether the criterion depends on the regressor alone, without torque noise.
+    /// Whether the criterion depends only on the regressor and not on torque noise.
     pub fn ignores_torque_noise(&self) -> bool {
         matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled | Self::WindowedCondition(_))
     }
@@ -248,19 +254,19 @@ impl CriterionChoice {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a standard deviation in Nm, or a list with one per joint")]
 pub enum TorqueNoise {
-    /// Value for every joint.
+    /// The same value for every joint.
     Same(f64),
     /// Values in the order of the model's joints.
     Each(Vec<f64>),
 }
 
 impl DesignSection {
-    /// Longest motion that can be checked for `model`, s.
+    /// Longest motion of `model` that can be checked, s.
     pub fn longest_s(model: &Model) -> f64 {
         model.characteristic_scale().seconds(MAX_DURATION_S)
     }
 
-    /// Start position of each joint that the family's settings fix, rad (m); empty if they fix none.
+    /// Start position of each joint that the family's settings define, rad (m); empty if they define none.
     pub fn start_of_family(&self) -> Vec<Option<f64>> {
         let own = match &self.family {
             FamilyChoice::SplicedLogistic(own) => own.offsets.as_ref(),

@@ -27,7 +27,7 @@ pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from
     from.deserialize_any(NameOrTable(PhantomData))
 }
 
-/// Schema of such a key: a string, or the schema of the table.
+/// Schema of a key whose value is a name or a table: a string, or the schema of the table.
 #[cfg(feature = "schema")]
 pub(crate) fn schema(schema: &mut schemars::Schema) {
     let table = core::mem::take(schema.ensure_object());

@@ -15,12 +15,13 @@ pub enum OptimiserChoice {
     Gradient,
     /// CMA-ES with a penalty proportional to the constraint violation.
     CmaEs(CmaEsSettings),
-    /// The paper's genetic algorithm.
+    /// Genetic algorithm with binary coding, as in *Iterative Identification of Robot Dynamic Parameters Based on
+    /// Logistic Function*.
     Genetic(BinaryGeneticSettings),
 }
 
 impl OptimiserChoice {
-    /// The `kind` in study files and results.
+    /// Value of `kind` in study files and results.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Gradient => "gradient",
@@ -46,7 +47,7 @@ impl OptimiserChoice {
         Ok(())
     }
 
-    /// The optimiser for the standard problem; `None` for the gradient method.
+    /// The optimiser without derivatives; `None` for the gradient method.
     pub fn derivative_free(&self) -> Option<DerivativeFree> {
         match self {
             Self::Gradient => None,

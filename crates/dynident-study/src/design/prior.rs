@@ -4,7 +4,7 @@ use crate::error::{Expected, StudyError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[design.prior]`. The information of several sources is added.
+/// Section `[design.prior]`. The information matrices of several sources are added.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -12,10 +12,11 @@ pub struct PriorSection {
     /// `result.json` of an earlier identification of the same robot; its covariance is the prior of the base
     /// parameters. The path is resolved in the same way as those of the logs.
     pub result: Option<PathBuf>,
-    /// Relative uncertainty of the inertial parameters in the robot description, percent (one standard deviation each,
-    /// independent). A parameter smaller than a tenth of the largest of its kind (first moments, moments of inertia) in
-    /// its body gets the uncertainty of that tenth; if the whole kind is zero in the body, the largest of the robot is
-    /// used. Friction uses the values in the robot description if present, otherwise it is unknown.
+    /// Relative uncertainty of the inertial parameters in the robot description, percent (one standard deviation
+    /// each, independent). A parameter smaller than a tenth of the largest one of its kind (first moments, moments of
+    /// inertia) in its body gets the uncertainty of that tenth. If all parameters of this kind are zero in the body,
+    /// the largest of the robot is used. The same percentage applies to friction in the robot description; other
+    /// friction is treated as unknown.
     pub cad_std_percent: Option<f64>,
 }
 

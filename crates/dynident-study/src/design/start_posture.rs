@@ -6,20 +6,20 @@ use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Positions at the start, rad (m): by joint name (other joints stay free), or a list of all joints in the order of the
-/// model.
+/// Positions at the start, rad (m): by joint name (other joints are free), or a list of all joints in the order of
+/// the model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "positions by joint, { elbow = 1.5 }, or a list with one per joint (rad, m)")]
 pub enum StartPosture {
-    /// By joint name.
+    /// Positions by joint name.
     ByJoint(BTreeMap<String, f64>),
-    /// All joints, in the model's order.
+    /// Positions of all joints, in the order of the model.
     List(Vec<f64>),
 }
 
 impl StartPosture {
-    /// Resolves the positions to the joints of the model; `key` is the study key for messages. `None` for a free joint.
+    /// Finds the positions of the joints of the model; `key` is the study key for messages. `None` for a free joint.
     ///
     /// # Errors
     /// An unknown joint, or a list whose length differs from the number of joints.
@@ -42,7 +42,7 @@ impl StartPosture {
         }
     }
 
-    /// Resolves the positions and checks them against the limits. `None` for a free joint.
+    /// Finds the positions and checks them against the limits. `None` for a free joint.
     ///
     /// # Errors
     /// An unknown joint, a list with the wrong length, a position that is not finite or outside of its limits. A

@@ -31,7 +31,7 @@ pub enum StudyFileError {
         path: PathBuf,
         /// Line, from 1.
         line: u32,
-        /// Column, from 1.
+        /// Column, in characters from 1.
         column: u32,
         /// The problem.
         source: Box<StudyError>,
@@ -52,9 +52,9 @@ pub enum StudyFileError {
     Missing {
         /// The file.
         file: PathBuf,
-        /// The paths tried.
+        /// The paths that were searched.
         tried: Vec<PathBuf>,
-        /// Source of the recordings.
+        /// Source of the recordings, if known.
         source_of_data: Option<String>,
     },
     /// A robot description that cannot be read.
@@ -73,7 +73,7 @@ pub enum StudyFileError {
     /// cause and the fix.
     #[error("log `{log}`: {source}")]
     Recording {
-        /// The log.
+        /// Name of the log.
         log: String,
         /// The problem.
         source: Box<RecordingError>,
@@ -82,7 +82,7 @@ pub enum StudyFileError {
     /// Correct the printed line.
     #[error("{}:{line}: {message}", path.display())]
     Table {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
         /// Line, from 1.
         line: u64,

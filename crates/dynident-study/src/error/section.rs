@@ -26,7 +26,7 @@ pub enum StudyError {
     /// The error is in this section or list entry of the study. The text after the place has the cause and the fix.
     #[error("{place}: {source}")]
     At {
-        /// The section, or the list entry.
+        /// Name of the section, or of the list entry.
         place: String,
         /// The error.
         source: Box<StudyError>,
@@ -43,7 +43,7 @@ pub enum StudyError {
     /// The file that was given as study is probably a log or another large file. Give the study, a small TOML file.
     #[error("larger than {} MiB: give a study file", most_bytes >> 20)]
     TooLarge {
-        /// Maximum size, bytes.
+        /// Maximum size of a study file, bytes.
         most_bytes: u64,
     },
     /// Invalid settings of a fit to commands.
@@ -65,7 +65,7 @@ pub enum StudyError {
     Numbers {
         /// The key.
         key: String,
-        /// Its values.
+        /// Values of the list.
         values: Vec<f64>,
         /// The valid values.
         expected: &'static str,
@@ -76,9 +76,9 @@ pub enum StudyError {
     Length {
         /// The key.
         key: &'static str,
-        /// Entries.
+        /// Number of entries.
         found: usize,
-        /// Joints.
+        /// Number of joints.
         expected: usize,
     },
     /// The key names a joint, link, log or other object that does not exist. Use one of the listed names; capital and
@@ -87,11 +87,11 @@ pub enum StudyError {
     Unknown {
         /// The key.
         key: &'static str,
-        /// The kind of object.
+        /// Kind of object.
         what: &'static str,
         /// The name.
         name: String,
-        /// The known names.
+        /// Known names.
         known: Vec<String>,
     },
     /// A name must belong to exactly one `[[log]]`. Correct the name, or give each `[[log]]` a unique `name`.
@@ -108,7 +108,7 @@ pub enum StudyError {
     /// them.
     #[error("{what} `{name}` is given twice: {fix}")]
     Twice {
-        /// The kind of list.
+        /// Kind of list.
         what: String,
         /// The name.
         name: String,
@@ -122,9 +122,9 @@ pub enum StudyError {
         joint: String,
         /// The key.
         key: &'static str,
-        /// The other key.
+        /// Name of the other key.
         other: &'static str,
-        /// State of the joint under the other key.
+        /// What the other key states about the joint.
         state: &'static str,
     },
     /// A log with `role = "validate"` and a training log select the same rows of one file. Validation then only repeats
@@ -133,9 +133,9 @@ pub enum StudyError {
         "validation log `{held_out}` contains samples of the training log `{training}`: select parts that do not overlap in both [[log]] entries (both by rows, by fraction, or by time_range_s), or use another file"
     )]
     Overlap {
-        /// The training log.
+        /// Name of the training log.
         training: String,
-        /// The held-out log.
+        /// Name of the held-out log.
         held_out: String,
     },
     /// Two files contain the same recording, for example a copy or a longer export. Validation then only repeats the
@@ -144,11 +144,11 @@ pub enum StudyError {
         "validation log `{held_out}` contains the same samples as the training log `{training}`: its row {held_out_row} and the following equal those of `{training}` from row {training_row} (two runs never have identical positions and torques): name the file of another run in this [[log]], or select parts that do not overlap"
     )]
     SameSamples {
-        /// The training log.
+        /// Name of the training log.
         training: String,
         /// First common row of the training log, 0-based.
         training_row: u64,
-        /// The held-out log.
+        /// Name of the held-out log.
         held_out: String,
         /// First common row of the held-out log, 0-based.
         held_out_row: u64,
@@ -159,11 +159,11 @@ pub enum StudyError {
         "training logs `{first}` and `{second}` contain the same samples: row {second_row} of `{second}` and the following equal those of `{first}` from row {first_row}, which would make the error bars too small: remove one of the logs, or select rows that do not overlap"
     )]
     RepeatedRows {
-        /// The first training log.
+        /// Name of the first training log.
         first: String,
         /// First common row of the first log, 0-based.
         first_row: u64,
-        /// The second training log.
+        /// Name of the second training log.
         second: String,
         /// First common row of the second log, 0-based.
         second_row: u64,
@@ -171,14 +171,14 @@ pub enum StudyError {
     /// The two keys state the same quantity in two ways. Delete one of them.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {
-        /// The stated keys.
+        /// Names of the keys.
         keys: Vec<&'static str>,
     },
     /// The command needs this part of the study, and the study does not have it. Add the key or section that the
     /// message names.
     #[error("{what}: {fix}")]
     Missing {
-        /// The missing part.
+        /// The missing part of the study.
         what: String,
         /// The fix.
         fix: String,
@@ -195,7 +195,7 @@ pub enum StudyError {
     /// of mass and inertia to the robot description.
     #[error("the inertial parameters of {} are unknown: {fix}", bodies.join(", "))]
     NoInertials {
-        /// The bodies.
+        /// Names of the bodies.
         bodies: Vec<String>,
         /// The fix.
         fix: &'static str,
@@ -231,7 +231,7 @@ pub enum StudyError {
     StrokeStart {
         /// The joint.
         joint: String,
-        /// Start of the stroke, rad.
+        /// Start of the joint's move, rad.
         offset_rad: f64,
         /// Position limits, rad.
         limits_rad: [f64; 2],
@@ -256,37 +256,37 @@ pub enum StudyError {
     /// A payload that does not belong to the robot.
     #[error("{0}")]
     Payload(#[from] PayloadError),
-    /// A filter, a differentiator or its reference.
+    /// An invalid filter, differentiator or reference motion.
     #[error("{0}")]
     Filter(#[from] FilterError),
-    /// The parallel filter.
+    /// Invalid settings of the parallel filter.
     #[error("{0}")]
     ParallelFilter(#[from] ParallelFilterError),
-    /// The periodic motion of an estimator.
+    /// Invalid settings of the periodic motion of an estimator.
     #[error("{0}")]
     Periods(#[from] PeriodError),
-    /// A setting of an estimator.
+    /// An invalid setting of an estimator.
     #[error("{0}")]
     Estimation(#[from] EstimationError),
-    /// A setting of the physically consistent fit.
+    /// An invalid setting of the physically consistent fit.
     #[error("{0}")]
     Physical(#[from] PhysicalError),
-    /// A trajectory family.
+    /// An invalid trajectory family.
     #[error("{0}")]
     Family(#[from] FamilyError),
-    /// Limits of a motion.
+    /// Invalid limits of a motion.
     #[error("{0}")]
     Limits(#[from] LimitError),
-    /// A search.
+    /// Invalid settings of a search.
     #[error("{0}")]
     Optimiser(#[from] OptimiserError),
-    /// A windowed design.
+    /// Invalid settings of a step-wise design.
     #[error("{0}")]
     StepWise(#[from] StepWiseError),
-    /// A simulated robot, a controller or a reference.
+    /// Invalid settings of a simulated robot, a controller or a reference.
     #[error("{0}")]
     Simulation(#[from] SimulationError),
-    /// An iteration.
+    /// Invalid settings of an iteration.
     #[error("{0}")]
     Iteration(#[source] Box<IterationError>),
 }
@@ -320,7 +320,7 @@ impl StudyError {
     }
 }
 
-/// Valid values of a number.
+/// Description of the valid values of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Expected {

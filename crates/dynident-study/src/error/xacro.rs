@@ -56,7 +56,7 @@ pub enum XacroError {
     },
 }
 
-/// Fix for a failure.
+/// Suggests a fix for a failure.
 fn fix(failure: &RunError) -> &'static str {
     match failure {
         RunError::NotFound { .. } => {

@@ -19,14 +19,14 @@ pub enum Automatic {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum DifferentiatorKey {
-    /// Selected in each run.
+    /// The method is selected in each run.
     Automatic(Automatic),
-    /// As stated.
+    /// The given method.
     Stated(DifferentiatorSettings),
 }
 
 impl<'de> Deserialize<'de> for DifferentiatorKey {
-    // Written by hand because an untagged enum loses the error of the inner key.
+    // This is written by hand, because an untagged enum loses the error of the inner key.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct KeyVisitor;
         impl<'de> Visitor<'de> for KeyVisitor {

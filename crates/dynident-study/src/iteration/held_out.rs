@@ -6,11 +6,11 @@ use crate::error::{Expected, StudyError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Added to the seed of the study's design for the search of the held-out motion.
+/// Added to the seed of the study's design for the search of the held-out motion, so that it differs.
 const HELD_OUT_SEED_OFFSET: u64 = 0x5851_f42d_4c95_7f2d;
 
-/// `held_out`: a motion that validates the newest model and is never used for a fit. Without keys it is designed as the
-/// study's motion with another seed, and is run before the iteration may end as converged.
+/// Key `held_out`: a motion that validates the newest model and is never used for a fit. Without keys it is designed
+/// like the study's motion, but with another seed. It runs before the iteration can end as converged.
 ///
 /// ```
 /// let section: dynident_study::IterationSection = toml::from_str("held_out = { every = 2 }")?;
@@ -21,7 +21,8 @@ const HELD_OUT_SEED_OFFSET: u64 = 0x5851_f42d_4c95_7f2d;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct HeldOutSection {
-    /// Runs it after every `every` accepted runs; by default only when all other conditions of convergence are met.
+    /// The motion runs after every `every` accepted runs; by default only when all other conditions of convergence
+    /// are met.
     pub every: Option<usize>,
     /// Trajectory file, in the format of `trajectory` of `[iteration]`.
     pub trajectory: Option<PathBuf>,
@@ -30,7 +31,7 @@ pub struct HeldOutSection {
 }
 
 impl IterationSection {
-    /// Checks `held_out`.
+    /// Checks the key `held_out`.
     ///
     /// # Errors
     /// A conflicting key, with the fix.

@@ -1,4 +1,5 @@
-//! `[[iteration.leg]]`: several trajectories, each with some joints held, run together or in sequence.
+//! `[[iteration.leg]]`: several trajectories (legs), each with some joints held. They run together or one after the
+//! other.
 
 use super::super::{DesignSection, StudyRobot};
 use super::IterationSection;
@@ -7,20 +8,21 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Order of several legs.
+/// Order of several trajectories (legs).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LegOrder {
-    /// Every run has all legs; the model is identified from all of them.
+    /// Every run contains all trajectories; the model is identified from all of them.
     #[default]
     Together,
-    /// Each leg has a separate iteration until it converges or reaches its maximum of runs; its estimates are then
-    /// fixed in the following legs. The paper's method: tip first.
+    /// Each trajectory has a separate iteration until it converges or reaches its maximum number of runs. Its
+    /// estimates are then fixed in the iterations of the following trajectories. *Iterative Identification of Robot
+    /// Dynamic Parameters Based on Logistic Function* does this, beginning with the tip joint.
     OneAfterAnother,
 }
 
-/// `[[iteration.leg]]`: one trajectory.
+/// Section `[[iteration.leg]]`: one trajectory.
 ///
 /// ```
 /// let section: dynident_study::IterationSection = toml::from_str(
@@ -36,18 +38,18 @@ pub enum LegOrder {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LegSection {
-    /// Held joints with their positions, rad (m); none by default. The torque of held joints is not used. A windowed
-    /// design runs only the strokes of the other joints.
+    /// Held joints with their positions, rad (m); none by default. The torque of held joints is not used. In a
+    /// step-wise design only the other joints move.
     pub hold: BTreeMap<String, f64>,
-    /// Whether the simulator locks the held joints (true by default), or the controller holds them. A robot outside of
-    /// the simulator receives them as joints that must rest.
+    /// Whether the simulator locks the held joints (true, the default); otherwise the controller holds them. A robot
+    /// outside the simulator receives them as joints that must rest.
     pub locked: bool,
     /// Trajectory file; by default that of the study.
     pub trajectory: Option<PathBuf>,
-    /// Design; by default the study's `[design]`.
+    /// Design of this trajectory; by default the study's `[design]`.
     pub design: Option<DesignSection>,
-    /// Time ranges by joint name (from, to; s) that are used in the fit; by default those of the design, or the whole
-    /// motion. Joints without an entry are then not used.
+    /// Time ranges by joint name (from, to; s) that are used in the fit. By default those of the design, or the whole
+    /// motion. If ranges are given, joints without an entry are not used.
     pub windows: BTreeMap<String, Vec<[f64; 2]>>,
     /// Name of the `[[payload]]` that the robot carries; no payload by default.
     pub payload: Option<String>,
@@ -67,7 +69,7 @@ impl Default for LegSection {
 }
 
 impl IterationSection {
-    /// Indices of the legs of each iteration: all together, or one after another.
+    /// Indices of the trajectories of each iteration: all in one iteration, or one per iteration.
     pub fn stages(&self) -> Vec<Vec<usize>> {
         match self.order {
             LegOrder::OneAfterAnother if self.leg.len() > 1 => (0..self.leg.len()).map(|leg| vec![leg]).collect(),
@@ -75,7 +77,7 @@ impl IterationSection {
         }
     }
 
-    /// Checks the legs against the joints of the robot.
+    /// Checks the trajectories against the joints of the robot.
     ///
     /// # Errors
     /// Exclusive keys, unknown joints, a position that is not finite, or a leg without a moving joint.

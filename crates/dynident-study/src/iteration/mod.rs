@@ -36,28 +36,28 @@ pub enum RobotChoice {
     /// The simulator with the settings of `[simulation]`.
     #[default]
     Simulation,
-    /// Another program over the line protocol.
+    /// Another program that uses the line protocol.
     Process(ProcessSettings),
-    /// A person: Dynident writes files and reads a log.
+    /// A person with a folder: Dynident writes files and reads a log.
     Folder(FolderSettings),
     /// A function of the calling program: `iterate_with_robot`.
     #[serde(skip)]
     Function,
 }
 
-/// Prior for the bodies before the first run.
+/// Prior knowledge of the bodies before the first run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorChoice {
-    /// Inertials of the robot description.
+    /// The inertials of the robot description.
     #[default]
     Description,
     /// No prior.
     None,
 }
 
-/// `[iteration]`; every key is optional.
+/// Section `[iteration]`; every key is optional.
 ///
 /// ```
 /// let section: dynident_study::IterationSection = toml::from_str(
@@ -78,85 +78,93 @@ pub enum PriorChoice {
 #[serde(deny_unknown_fields, default)]
 #[allow(clippy::struct_excessive_bools, reason = "independent keys of a file")]
 pub struct IterationSection {
-    /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of one from `[design]`.
+    /// File of the trajectory to run (`t_s, q1.., dq1.., ddq1..`), instead of a trajectory from `[design]`.
     pub trajectory: Option<PathBuf>,
     /// Whether every run repeats the first motion (`"repeat"`, the default), or each later run is designed with the
-    /// current estimate (`"redesign"`). A name, or a table with a `kind` and its settings.
+    /// current estimate (`"redesign"`). The value is a name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
     pub motion: MotionChoice,
     /// A motion that validates the newest model and is never used for a fit; none by default.
     pub held_out: Option<HeldOutSection>,
-    /// Several trajectories in place of one, some with held joints; each uses the study's trajectory or design unless
-    /// it states its own.
+    /// Several trajectories (legs) instead of one, some with held joints. Each uses the study's trajectory or design
+    /// unless it has its own.
     pub leg: Vec<LegSection>,
-    /// Whether every run has all legs (`"together"`, the default), or each leg has a separate iteration with the
-    /// estimates of earlier legs fixed (`"one-after-another"`).
+    /// Whether every run contains all trajectories (`"together"`, the default), or each trajectory has a separate
+    /// iteration with the estimates of the earlier ones fixed (`"one-after-another"`).
     pub order: LegOrder,
     /// The robot that runs the trajectories; the simulator by default.
     pub robot: RobotChoice,
-    /// Prior for the bodies before the first run; the robot description by default.
+    /// Prior knowledge of the bodies before the first run; the robot description by default.
     pub prior: PriorChoice,
     /// Controller of the first run: `"model-free"` (the default; `"prior"` with `bandwidth_hz`) or `"prior"`.
     pub start: Option<StartWith>,
-    /// Controller of a first run with the prior; by default `[controller]`.
+    /// Controller of the first run if it uses the prior model; by default `[controller]`.
     pub first: Option<ControllerSettings>,
-    /// Identification scheme: all joints at once, or step by step.
+    /// Identification scheme: all joints at once, or joint by joint.
     pub scheme: Scheme,
-    /// Uses every sample of every joint, even if a windowed design defines windows; false by default.
+    /// Whether to use every sample of every joint, even if a step-wise design defines time windows; false by default.
     pub every_sample: bool,
-    /// The paper's original scheme: no physically consistent fit, no rejected runs, no pooling. False by default.
+    /// Whether to use the original scheme of *Iterative Identification of Robot Dynamic Parameters Based on Logistic
+    /// Function*: no physically consistent fit, no rejected runs, each model from the newest run only. False by
+    /// default.
     pub literal: bool,
-    /// Whether the model is fitted to all accepted runs together, each weighted by its residual variance; true by
-    /// default. Otherwise to the newest run only.
+    /// Whether the model is fitted to all accepted runs together, each weighted by its residual variance (true, the
+    /// default), or to the newest run only.
     pub pool: bool,
-    /// Method for velocities and accelerations; `deviation` from the trajectory by default. With `"auto"` each run uses
-    /// the method with the smallest torque residual; the candidates include the paper's map.
+    /// Method that computes velocities and accelerations from positions; by default `deviation` from the trajectory.
+    /// With `"auto"` each run uses the method with the smallest torque residual. The candidates include the map from
+    /// position along logistic functions.
     pub differentiator: DifferentiatorKey,
-    /// Low-pass filter and decimation, applied to torque and regressor; none by default.
+    /// Low-pass filter and decimation that are applied to torque and regressor; none by default.
     pub parallel_filter: Option<DecimationSettings>,
     /// Whether recorded torques are constant between samples (zero-order hold); true by default.
     pub held_torque: bool,
-    /// The controller without a model; by default joint PD with gains 16 and 8 in the simulator. A robot outside of the
-    /// simulator has no default gains.
+    /// The controller without a model; by default joint PD with the gains 16 and 8 in the simulator. A robot outside
+    /// the simulator has no default gains.
     pub model_free: Option<ControllerSettings>,
-    /// Natural frequency of each joint, Hz, for gains that are not stated; these are computed from the inertials of the
-    /// robot description with critical damping. One number for all joints, or a list.
+    /// Natural frequency of each joint's loop, Hz, for gains that are not given. They are computed from the inertials
+    /// of the robot description with critical damping. One number for all joints, or a list.
     pub bandwidth_hz: Option<PerJoint>,
-    /// Limits that stop a run when a sample exceeds them. For a robot outside of the simulator the default is the robot
-    /// description's limits with a margin, and a path error of 0.3 rad (0.1 m).
+    /// Limits of every sample; a sample outside stops the run. For a robot outside the simulator the default is the
+    /// robot description's limits with a margin, and a tracking error of 0.3 rad (0.1 m).
     pub envelope: EnvelopeSettings,
-    /// Rehearsal: simulation of every motion before a robot outside of the simulator runs it.
+    /// Rehearsal: simulation of every motion before a robot outside the simulator executes it.
     pub rehearsal: RehearsalSettings,
-    /// Thresholds of oscillation, for stopping a run of a robot outside of the simulator and for reports about a log.
+    /// Thresholds for oscillations: they stop a run of a robot outside the simulator, and are reported for a log.
     pub oscillation: OscillationSettings,
     /// Rate of the robot's control loop and of the transferred samples, Hz; `[simulation] rate_hz` (1000) by default.
     pub rate_hz: Option<f64>,
-    /// Speed factors at which the motion is run before the first run, for example `[0.1, 0.5, 1.0]`; none by default.
+    /// Shares of the full speed at which the motion is run before the first run, for example `[0.1, 0.5, 1.0]`; none
+    /// by default.
     pub speed_steps: Vec<f64>,
     /// Home posture between runs, rad (m), all joints by name or in the order of the model: every run moves from there
     /// to the start of its motion and back, within the limits of `[design]`. Without it the robot must be at the start
     /// of the motion.
     pub home: Option<StartPosture>,
-    /// Fraction of the velocity and acceleration limits used between home and the motion; 0.2 by default.
+    /// Share of the velocity and acceleration limits that the paths between home posture and motion use; 0.2 by
+    /// default.
     pub approach_speed: f64,
-    /// Duration of warm-up motion before the first run of a call, s, so that friction is at its working temperature;
-    /// repeated after a longer pause. 0 (none) by default. Not available with a robot behind a folder.
+    /// Duration of warm-up motion before the first run of a call, s, so that friction reaches its working
+    /// temperature. The warm-up is repeated after a longer pause. 0 (no warm-up) by default. Not available for a
+    /// robot behind a folder.
     pub warm_up_s: f64,
-    /// Factor on the tracking error of the last accepted run above which a run is rejected.
+    /// A run is rejected if its tracking error exceeds this factor times the error of the last accepted run.
     pub worse_factor: f64,
-    /// Maximum number of step halvings before the iteration returns to the controller without a model.
+    /// Maximum number of times that the change of the parameters is halved, before the iteration returns to the
+    /// controller without a model.
     pub most_halvings: usize,
     /// Factor on the gains of the controller without a model after each failed run; 2 by default, 1 (unchanged) for a
-    /// robot outside of the simulator.
+    /// robot outside the simulator.
     pub stiffen: Option<f64>,
-    /// Maximum number of failed runs without a model; then the iteration ends because the robot cannot follow.
+    /// Maximum number of failed runs without a model; after that the iteration ends, because the robot cannot follow
+    /// the motion.
     pub most_model_free: usize,
     /// Maximum number of runs.
     pub max_runs: usize,
     /// Convergence thresholds.
     pub settled: ConvergenceSettings,
-    /// Thresholds for the difference between logged and commanded torque.
+    /// Thresholds for reporting a difference between logged and commanded torque.
     pub torque_check: TorqueCheckSettings,
 }
 
@@ -212,8 +220,8 @@ impl Default for IterationSection {
 }
 
 impl IterationSection {
-    /// Builds the iteration settings with the study's `[controller]`; runs are identified with `identification`, with
-    /// the iteration's differentiator and filter.
+    /// Builds the iteration settings with the study's `[controller]`. Runs are identified with `identification`, with
+    /// the differentiator and filter of the iteration.
     ///
     /// # Errors
     /// A setting that the identification of a run does not support.
@@ -233,7 +241,7 @@ impl IterationSection {
             OffsetChoice::Shared => RunOffsets::WhereSeen,
             OffsetChoice::PerLog => RunOffsets::PerRun,
         };
-        // The controller uses the friction that the study states, unless `friction = "auto"` is set.
+        // The controller uses the friction that the study describes, unless `friction = "auto"` is set.
         let friction =
             friction.retaining(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
@@ -246,7 +254,7 @@ impl IterationSection {
             let fix = "the selection needs runs that excite all joints; state the friction, or remove scheme and order from [iteration]";
             return Err(StudyError::conflict("drive.friction = \"auto\"", fix));
         }
-        // Tests and essential parameters are for the final identification only.
+        // Tests and the selection of essential parameters belong to the final identification only.
         (estimation.exogeneity_test, estimation.essential) = (None, None);
         estimation.examine_exogeneity = false;
         if let Estimator::Auto(_) = estimation.estimator {
@@ -275,7 +283,7 @@ impl IterationSection {
             pool: self.pool && !self.literal,
             worse_factor: self.worse_factor,
             most_halvings: self.most_halvings,
-            // Gains of a robot outside of the simulator increase only on request.
+            // Gains of a robot outside the simulator are increased only on request.
             stiffen: self.stiffen.unwrap_or(if self.is_outside() { 1.0 } else { default.stiffen }),
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,

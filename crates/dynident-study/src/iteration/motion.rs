@@ -14,13 +14,13 @@ pub enum MotionChoice {
     /// Repeats the motion of the first run.
     #[default]
     Repeat,
-    /// From the second run on, a motion of `[design]`'s family within its limits that reduces the variance of the least
-    /// known directions most. Further runs continue while one improves them enough.
+    /// From the second run on, a motion of `[design]`'s family within its limits, which reduces the widest error bars
+    /// most. Further runs follow while a motion reduces them enough.
     Redesign(RedesignSettings),
 }
 
 impl IterationSection {
-    /// The settings of a redesign; `None` if not requested.
+    /// Settings for designing each motion again; `None` if not requested.
     ///
     /// # Errors
     /// A key that conflicts with a redesign, with the fix.

@@ -13,7 +13,7 @@ use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
 
 impl IterationSection {
-    /// Whether the robot is outside of the simulator.
+    /// Whether the robot is outside the simulator.
     pub fn is_outside(&self) -> bool {
         match self.robot {
             RobotChoice::Simulation => false,
@@ -21,12 +21,12 @@ impl IterationSection {
         }
     }
 
-    /// The envelope for a robot outside of the simulator, or a stated one; otherwise `None`.
+    /// The envelope of a robot outside the simulator, or an envelope given in the study; otherwise `None`.
     pub fn envelope_in_force(&self) -> Option<&EnvelopeSettings> {
         (self.is_outside() || self.envelope != EnvelopeSettings::default()).then_some(&self.envelope)
     }
 
-    /// Checks that a robot outside of the simulator has stated gains, or a stated bandwidth and a description with
+    /// Checks that a robot outside the simulator has given gains, or a given bandwidth and a description with
     /// inertials.
     ///
     /// # Errors
@@ -65,7 +65,8 @@ impl IterationSection {
         ))
     }
 
-    /// Whether Dynident computes every torque in step with the robot, so that only a stated delay exists.
+    /// Whether Dynident computes every torque in step with the robot, so that there is no delay except one given in
+    /// the study.
     fn steps(&self) -> bool {
         match &self.robot {
             RobotChoice::Simulation | RobotChoice::Function => true,
@@ -74,8 +75,8 @@ impl IterationSection {
         }
     }
 
-    /// Assumed delay of the controller, s, if the study does not state it: that of the simulated sensors for the
-    /// simulator. Stated gains have run with the real delay, so they need none.
+    /// Assumed delay of the controller, s, if the study gives none. For the simulator it is the delay of the
+    /// simulated sensors. Given gains have been used with the real delay, so they need no assumed delay.
     fn delay_s(&self, study: &Study, robot: &StudyRobot) -> f64 {
         let simulation = study.simulation.clone().unwrap_or_default();
         let rate_hz = self.rate_hz.unwrap_or(simulation.rate_hz);
@@ -87,7 +88,7 @@ impl IterationSection {
         }
     }
 
-    /// Completes the settings with controllers, envelope and rehearsal for the robot and its `references`, and returns
+    /// Completes the settings with controllers, envelope and rehearsal for the robot and its `references`. Returns
     /// the joints whose derived loops are slower than `bandwidth_hz`.
     ///
     /// # Errors
@@ -103,7 +104,7 @@ impl IterationSection {
         self.rehearsal.validate()?;
         let mut lowered = Vec::new();
         let (outside, model) = (self.is_outside(), robot.model());
-        // Without a model the drives' loop gets only the path.
+        // Without a model, the drives' position loop receives only the path.
         if let (Some(ControllerSettings::PositionLoop(own)), None) = (&study.controller, &self.model_free) {
             let own = PositionLoopSettings { feed_forward: false, ..own.clone() };
             settings.model_free = ControllerSettings::PositionLoop(own);
@@ -114,7 +115,7 @@ impl IterationSection {
                 uncertainty_percent: self.rehearsal.uncertainty_percent,
                 delay_s: self.delay_s(study, robot),
                 lightest_drive: if outside { self.rehearsal.lightest_drive() } else { 1.0 },
-                // A robot in step mode still has real drives and sensors.
+                // A robot in mode `step` still has real drives and sensors.
                 light_delay_s: self.rehearsal.delay_s(model),
                 tracking_error: self.envelope.tracking_error.clone(),
             };
@@ -128,7 +129,7 @@ impl IterationSection {
                 note("none", &derived.model_free_hz);
                 settings.model_free = derived.model_free;
             }
-            // A robot description with bodies also gives gravity compensation.
+            // A robot description with masses also permits gravity compensation.
             if self.start.is_none() && self.model_free.is_none() {
                 settings.start = StartWith::Prior;
             }
@@ -148,7 +149,7 @@ impl IterationSection {
             oscillation: self.oscillation.clone(),
             rehearsal: outside.then(|| RehearsalSettings {
                 delay_s: Some(self.delay_s(study, robot)),
-                // Stated gains have already run on the robot.
+                // Given gains have already been used on the robot.
                 lightest_drive: self.rehearsal.lightest_drive.or(self.bandwidth_hz.is_none().then_some(1.0)),
                 ..self.rehearsal.clone()
             }),
@@ -160,7 +161,7 @@ impl IterationSection {
         Ok((settings, lowered))
     }
 
-    /// Checks that a warm-up is possible.
+    /// Checks that a warm-up is possible with this robot.
     ///
     /// # Errors
     /// A robot behind a folder: each call makes one run, and a person warms the robot up.
@@ -173,7 +174,7 @@ impl IterationSection {
         Ok(())
     }
 
-    /// Home posture and limits of the approach motion.
+    /// Home posture, and limits of the approach and return paths.
     ///
     /// # Errors
     /// An incomplete posture, or legs that lock joints.
@@ -198,7 +199,7 @@ impl IterationSection {
     }
 
     /// The section without settings that do not affect the data of a run: program of the robot and its time limits,
-    /// stop conditions, warm-up, home, end of the iteration. Earlier runs remain valid when these change.
+    /// stop conditions, warm-up, home posture, end of the iteration. Earlier runs remain valid when these change.
     pub fn without_unrelated_settings(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
@@ -220,13 +221,13 @@ impl IterationSection {
             held_out.every = None;
         }
         own.oscillation = default.oscillation;
-        // Gains derived from a bandwidth depend on delay, light drives and model uncertainty.
+        // Gains that are derived from a bandwidth depend on delay, light drives and model uncertainty.
         let RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, .. } = own.rehearsal;
         own.rehearsal = match own.bandwidth_hz {
             Some(_) => RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, ..default.rehearsal },
             None => default.rehearsal,
         };
-        // Home, approach speed and warm-up of a robot outside of the simulator do not change its motion.
+        // Home posture, approach speed and warm-up of a robot outside the simulator do not change its motion.
         if self.is_outside() {
             (own.home, own.approach_speed, own.warm_up_s) = (None, default.approach_speed, 0.0);
         }

@@ -1,4 +1,4 @@
-//! Codes of errors: the names under which the page "Messages" of the book lists them.
+//! Codes of errors: the book's page "Messages" lists the errors by these codes.
 
 use super::{Error, FactorsError, FigureError, NewStudyError, ResultFileError, StudyError, StudyFileError};
 use core::error::Error as StdError;
@@ -31,7 +31,7 @@ use dynident_simulation::{PlantFault, SimulationError};
 use dynident_study::XacroError;
 use dynident_system::{ProgramRefused, RunError};
 
-/// Returns the code of an error of this type, or of a box with one.
+/// Returns the code of an error of this type, or of a box that contains such an error.
 type CodeOf = fn(&(dyn StdError + 'static)) -> Option<String>;
 
 /// The errors that can be the cause of an [`Error`].
@@ -100,8 +100,8 @@ const CODES: &[CodeOf] = &[
 ];
 
 impl Error {
-    /// Code of the innermost cause with a code, such as `study-toml`: type and variant of the error. The page
-    /// "Messages" of the book explains each code.
+    /// Code of the innermost cause that has a code, such as `study-toml`. The code consists of type and variant of
+    /// the error. The page "Messages" of the book explains each code.
     pub fn code(&self) -> Option<String> {
         let causes = core::iter::successors(Some(self as &(dyn StdError + 'static)), |error| (**error).source());
         causes.filter_map(|cause| CODES.iter().find_map(|code| code(cause))).last()
@@ -112,13 +112,13 @@ fn of<E: StdError + 'static>(error: &(dyn StdError + 'static)) -> Option<String>
     let error = error.downcast_ref::<E>().or_else(|| error.downcast_ref::<Box<E>>().map(|inner| &**inner))?;
     let path = core::any::type_name::<E>();
     let kind = path.rsplit("::").next().unwrap_or(path);
-    // The derived format of an enum begins with the name of the variant, that of a struct with the name of the type.
+    // The debug text of an enum begins with the name of the variant, that of a struct with the name of the type.
     let shown = format!("{error:?}");
     let variant = shown.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
     Some(error_code(kind, (variant != kind).then_some(variant)))
 }
 
-/// Code of an error from the names of its type and variant: `StudyError::NotUtf8` has `study-not-utf8`.
+/// Code of an error from the names of its type and variant: `StudyError::NotUtf8` has the code `study-not-utf8`.
 pub fn error_code(kind: &str, variant: Option<&str>) -> String {
     let stem = kind.strip_suffix("Error").filter(|stem| !stem.is_empty());
     let mut code = String::new();

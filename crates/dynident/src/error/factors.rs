@@ -15,15 +15,15 @@ pub enum FactorsError {
         "version {found} of the format; this program reads version {known}: run `dynident reduce` on the logs again"
     )]
     Version {
-        /// Version of the file.
+        /// Version in the file.
         found: u32,
-        /// Version of the program.
+        /// Version that this program reads.
         known: u32,
     },
     /// The file is not complete, usually because a copy was interrupted.
     #[error("truncated file ({bytes} bytes): copy it again")]
     Short {
-        /// Length, bytes.
+        /// Length of the file, bytes.
         bytes: usize,
     },
     /// The content of the file changed after it was written, usually by a faulty copy.
@@ -39,7 +39,7 @@ pub enum FactorsError {
     /// log again.
     #[error("log {log}: {source}; run `dynident reduce` on this log again")]
     Numbers {
-        /// The log.
+        /// Name of the log.
         log: String,
         /// The problem.
         source: EstimationError,
@@ -51,7 +51,7 @@ pub enum FactorsError {
     /// on all logs with one study.
     #[error("factors of different studies cannot be merged: {} differ; reduce all logs with the same study (and the same --like model)", sections.iter().map(|name| format!("[{name}]")).collect::<Vec<_>>().join(", "))]
     Unlike {
-        /// The sections that differ.
+        /// Names of the sections that differ.
         sections: Vec<String>,
     },
     /// The study uses a function of a calling program, such as an own friction law, and a file cannot contain it.
@@ -60,7 +60,7 @@ pub enum FactorsError {
         "{part} is a function of the calling program, but factor files cannot contain code: run `identify` on the logs"
     )]
     Function {
-        /// The part with the name of its function.
+        /// The part of the study, with the name of its function.
         part: String,
     },
     /// The study takes a torque from a `table_file`. Write its points as `table` into the study, or remove the

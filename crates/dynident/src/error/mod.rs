@@ -50,7 +50,7 @@ pub enum Error {
     /// The fit ended with the error that follows the path. That error has its own code; run `dynident docs` with it.
     #[error("{}: {source}", path.display())]
     Identification {
-        /// The study file.
+        /// Path of the study file.
         path: PathBuf,
         /// The problem.
         source: Box<IdentificationError>,
@@ -62,9 +62,9 @@ pub enum Error {
         path.display()
     )]
     NotPermitted {
-        /// The study file.
+        /// Path of the study file.
         path: PathBuf,
-        /// The program.
+        /// The program that is not permitted.
         source: ProgramRefused,
     },
     /// The numbers of the result cannot be drawn. The study and the logs are not the cause; report the message and the
@@ -78,7 +78,7 @@ pub enum Error {
     /// values that the job needs. The text after the path states what to do, usually to run `identify` again.
     #[error("{}: {message}", path.display())]
     Result {
-        /// The result file.
+        /// Path of the result file.
         path: PathBuf,
         /// The problem and the fix.
         message: String,
@@ -87,7 +87,7 @@ pub enum Error {
     /// with its own code.
     #[error("{}: {source}", path.display())]
     Factors {
-        /// The file, or the study.
+        /// Path of the factor file, or of the study.
         path: PathBuf,
         /// The problem.
         source: FactorsError,
@@ -99,7 +99,7 @@ pub enum Error {
     /// the cause with its own code.
     #[error("{}: {source}", path.display())]
     Export {
-        /// The result file.
+        /// Path of the result file.
         path: PathBuf,
         /// The problem.
         source: Box<ExportError>,
@@ -108,7 +108,7 @@ pub enum Error {
     /// Correct the line that the message names.
     #[error("{}:{line}: {message}", path.display())]
     States {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -118,15 +118,15 @@ pub enum Error {
     /// The command was stopped, for example by Ctrl-C, before it had a result. Run it again.
     #[error("{what} was interrupted before there was a result: run the command again to restart it")]
     Interrupted {
-        /// The interrupted step.
+        /// Name of the interrupted step.
         what: &'static str,
     },
     /// The output folder or file of the command is one of its input files. Give another path with `--out`.
     #[error("{}: would overwrite the input {}; nothing was written: give another --out", output.display(), input.display())]
     Overwrite {
-        /// The output.
+        /// Path of the output.
         output: PathBuf,
-        /// The input.
+        /// Path of the input.
         input: PathBuf,
     },
     /// The folder does not exist, the disk is full, or you have no permission to write. Correct this or give another
@@ -151,17 +151,17 @@ impl Error {
         Self::Study(StudyFileError::recording(log, source))
     }
 
-    /// For `map_err`: wraps an identification error of the study at `path`.
+    /// For `map_err`: converts an identification error of the study at `path`.
     pub(crate) fn identification<E: Into<IdentificationError>>(path: &Path) -> impl Fn(E) -> Self {
         move |source| Self::Identification { path: path.to_owned(), source: Box::new(source.into()) }
     }
 
-    /// For `map_err`: wraps an error in the study at `path`.
+    /// For `map_err`: converts an error in the study at `path`.
     pub(crate) fn study<E: Into<StudyError>>(path: &Path) -> impl Fn(E) -> Self {
         move |source| Self::Study(StudyFileError::study(path)(source))
     }
 
-    /// For `map_err`: wraps an error in a section of the study at `path`.
+    /// For `map_err`: converts an error in a section of the study at `path`.
     pub(crate) fn section<E: Into<StudyError>>(path: &Path, section: &str) -> impl Fn(E) -> Self {
         move |source| Self::study(path)(StudyError::at(format!("[{section}]"))(source))
     }

@@ -11,9 +11,9 @@ pub enum NewStudyError {
     /// Rename the columns in the file, or write the study by hand.
     #[error("no columns of {quantity} recognised: {}; write the study by hand (page \"Your robot in 15 minutes\": `dynident docs your-robot`); `dynident log` shows the contents of a recording", listed(.found))]
     NotRecognised {
-        /// `positions`, or `torques or currents`.
+        /// Missing quantity: `positions`, or `torques or currents`.
         quantity: &'static str,
-        /// The columns of each recording.
+        /// The columns that were found in each recording.
         found: Vec<RecognisedFile>,
     },
     /// The log has position columns for more joints than the robot. The robot description is of another robot, or the
@@ -22,21 +22,21 @@ pub enum NewStudyError {
         "{columns} position columns, but the robot description has {joints} independent joints: check that it is the robot of this recording"
     )]
     MoreColumnsThanJoints {
-        /// Position columns.
+        /// Number of position columns.
         columns: usize,
-        /// Independent joints.
+        /// Number of independent joints of the robot.
         joints: usize,
     },
 }
 
-/// The columns of one recording by their names.
+/// The columns of one recording, sorted by whether their names are known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecognisedFile {
     /// Name of the file.
     pub file: String,
     /// Number of columns.
     pub columns: usize,
-    /// Columns with a known quantity of joints; empty without such columns.
+    /// Columns whose names state a quantity of joints; empty if there are none.
     pub known: String,
     /// All other columns.
     pub unknown: String,

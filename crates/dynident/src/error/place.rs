@@ -8,10 +8,10 @@ use dynident_result::ResultFileError;
 use dynident_study::StudyFileError;
 use std::path::{Path, PathBuf};
 
-/// The place of an error, as far as it is known.
+/// The place of an error; parts that are not known are `None`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ErrorPlace {
-    /// The file; for a study or samples in memory, their name in messages.
+    /// Path of the file; for a study or samples in memory, their name in messages.
     pub path: Option<PathBuf>,
     /// Line, from 1.
     pub line: Option<u64>,
@@ -45,7 +45,7 @@ pub fn place_in_robot(error: &ReadError) -> ErrorPlace {
         ReadError::Mjcf { path, source } => ErrorPlace::column(path, source.line, source.column),
         ReadError::Sdf { path, source } => ErrorPlace::column(path, source.line, source.column),
         ReadError::Dh { path, source } => ErrorPlace::column(path, source.line, source.column),
-        // An error that is added later has no place until it is listed here.
+        // Errors without a place, and errors that are not listed above.
         _ => ErrorPlace::default(),
     }
 }

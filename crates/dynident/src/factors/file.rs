@@ -58,8 +58,8 @@ struct HeadLog {
 }
 
 impl Factors {
-    /// Serialises the factors to one file with a version and a hash. About `joints × segments × (columns + 1)² × 4`
-    /// bytes per log.
+    /// Serialises the factors to one file with a version and a hash. The file has about `joints × segments × (columns
+    /// + 1)² × 4` bytes per log.
     ///
     /// # Errors
     /// [`FactorsError::Header`] for a study that JSON cannot represent.
@@ -156,7 +156,7 @@ fn head_of(log: &FactorLog) -> HeadLog {
     }
 }
 
-/// The log of a header; removes its numbers from `rest`.
+/// Reads the log of a header entry, and removes its numbers from `rest`.
 fn log_of(head: HeadLog, rest: &mut &[u8], file_bytes: usize) -> Result<FactorLog, FactorsError> {
     let name = head.name;
     let mut factors = |shapes: &[FactorShape]| -> Result<Vec<SegmentedFactor>, FactorsError> {

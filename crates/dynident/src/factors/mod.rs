@@ -1,5 +1,5 @@
-//! **Logs as factors**: a small form of many logs of one type of robot, which can be merged in any order and identified
-//! without the logs.
+//! **Logs as factors**: triangular factors are a small representation of many logs of one type of robot. Factors can
+//! be merged in any order, and identified without the logs.
 
 mod file;
 
@@ -21,9 +21,9 @@ pub struct FactorLog {
     pub arm: Option<String>,
     /// Time of recording, seconds since 1970-01-01 (UTC).
     pub recorded_at_s: Option<f64>,
-    /// SHA-256 of its numbers; equal hashes mean the same log.
+    /// SHA-256 of the numbers of the log; equal hashes mean the same log.
     pub sha256: String,
-    /// The factors.
+    /// The factors of the log.
     pub log: ReducedLog,
 }
 
@@ -39,7 +39,7 @@ impl FactorLog {
         Self { arm, recorded_at_s, sha256: hexadecimal(&hash.finalize()), log }
     }
 
-    /// Size of its numbers, bytes.
+    /// Size of the numbers of the log, bytes.
     pub fn numbers_bytes(&self) -> u64 {
         let factors = self.log.factors.iter().chain(self.log.noise.iter().flatten());
         factors.map(|factor| 8 * factor.shape().count().unwrap_or(0) as u64).sum()
@@ -60,10 +60,11 @@ impl FactorLog {
 /// (robot, time, name, hash), so the result is bit-identical for any order of merging.
 #[derive(Clone, Debug)]
 pub struct Factors {
-    /// Common robot, drives, filters and estimator; the robot description is in memory, and there are no logs.
+    /// Robot, drives, filters and estimator that all logs share. The robot description is in memory, and the study
+    /// has no logs.
     pub(crate) study: Study,
     pub(crate) study_path: PathBuf,
-    /// Sorted by key, without duplicates.
+    /// The logs, sorted by their keys, without duplicates.
     logs: Vec<FactorLog>,
 }
 
@@ -120,7 +121,7 @@ impl Factors {
         Self { study: self.study.clone(), study_path: self.study_path.clone(), logs }
     }
 
-    /// Merges the logs of several parts in any order. Duplicate logs are used once, so a repeated reduction has no
+    /// Merges the logs of several parts in any order. Duplicate logs are used once, so reducing a log twice has no
     /// effect.
     ///
     /// # Errors
@@ -137,7 +138,7 @@ impl Factors {
         Ok(all)
     }
 
-    /// Settings that must be equal in merged factors.
+    /// Settings that must be equal in all merged factors.
     fn kind(&self) -> Result<serde_json::Value, FactorsError> {
         let cannot = |error: serde_json::Error| FactorsError::Header { problem: error.to_string() };
         let mut kind = self.study.to_json().map_err(cannot)?;
@@ -166,7 +167,7 @@ fn sorted_unique(mut logs: Vec<FactorLog>) -> Vec<FactorLog> {
 }
 
 /// Seconds since 1970-01-01 of a time in UTC: `2026-01-05T08:00:00Z`, `2026-01-05 08:00:00`, `2026-01-05`, or the
-/// seconds; `None` for other texts.
+/// number of seconds; `None` for other texts.
 pub fn seconds_of(text: &str) -> Option<f64> {
     let text = text.trim();
     if let Ok(seconds) = text.parse::<f64>() {
@@ -177,7 +178,7 @@ pub fn seconds_of(text: &str) -> Option<f64> {
     Some(at.duration_since(UNIX_EPOCH).ok()?.as_secs_f64())
 }
 
-/// The file name without its folder, because files from several computers must be equal.
+/// The file name without its folder, because factors from several computers must be equal.
 pub(crate) fn name_alone(path: &Path) -> PathBuf {
     path.file_name().map_or_else(|| path.to_owned(), PathBuf::from)
 }

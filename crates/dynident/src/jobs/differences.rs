@@ -1,24 +1,26 @@
-//! Explanations of the difference from a robot description, as results list them.
+//! Explanations of the difference from a robot description or between two results, as results list them.
 
 use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison};
 use dynident_estimation::HALF_WIDTH_95;
-use dynident_identification::changes::{DescriptionDifferences, Part};
+use dynident_identification::changes::Differences;
 use dynident_identification::{DescriptionThresholds, Identification};
 use dynident_model::Model;
 
 /// Probability below which an explanation is omitted.
-pub(in crate::jobs) const MIN_LISTED_PROBABILITY: f64 = 0.01;
+const MIN_LISTED_PROBABILITY: f64 = 0.01;
 
-/// The explanations, the most probable first; all in which every body differs are one.
+/// The explanations, most probable first. All explanations in which every body differs are merged.
 pub(in crate::jobs) fn explanations_of(
-    found: &DescriptionDifferences,
+    found: &Differences,
     model: &Model,
     limits: &DescriptionThresholds,
 ) -> Vec<ChangeExplanation> {
     let sets = found.sets(limits).into_iter().map(|(probability, own)| {
-        let changed = found.bodies_of(own).into_iter().map(|body| {
+        let changed = found.parts_of(own).into_iter().map(|part| {
+            let words = part.words(model);
+            let Some(body) = part.body() else { return ChangedPart { part: words, ..ChangedPart::default() } };
             let (change, covariance) = found.change_of(own, body);
-            changed_body(Part::Body(body).words(model), change.as_slice(), covariance[(0, 0)].max(0.0).sqrt())
+            changed_body(words, change.as_slice(), covariance[(0, 0)].max(0.0).sqrt())
         });
         ChangeExplanation { parts: changed.collect(), everything: false, probability, remaining: own.remaining }
     });
@@ -49,7 +51,7 @@ pub(in crate::jobs) fn description_comparison(
 }
 
 /// A body with the change of its ten values: of its mass, and its centre if the change of the mass is significant.
-pub(in crate::jobs) fn changed_body(part: String, change: &[f64], mass_std: f64) -> ChangedPart {
+fn changed_body(part: String, change: &[f64], mass_std: f64) -> ChangedPart {
     let (mass, half_width) = (change[0], HALF_WIDTH_95 * mass_std);
     let centre = (mass.abs() > half_width).then(|| [change[1] / mass, change[2] / mass, change[3] / mass]);
     ChangedPart { part, mass_kg: Some(mass), half_width_95_kg: Some(half_width), centre_m: centre }

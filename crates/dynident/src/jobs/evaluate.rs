@@ -9,7 +9,7 @@ use dynident_model::{INERTIAL_NAMES, Model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Computed quantity.
+/// Quantity to be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Torques from `q`, `dq`, `ddq`.
@@ -22,7 +22,7 @@ pub enum Quantity {
     CoriolisMatrix,
     /// Gravity torque from `q`.
     Gravity,
-    /// Derivative of the gravity torque by position from `q`, row by row.
+    /// Derivative of the gravity torque with respect to position, from `q`, row by row.
     GravityDerivative,
     /// Torque regressor from `q`, `dq`, `ddq`, row by row.
     Regressor,
@@ -56,7 +56,7 @@ impl Quantity {
         }
     }
 
-    /// Values for one state; `state` contains the groups in order.
+    /// Computes the values for one state; `state` contains the groups of columns in order.
     fn of_state<'w>(self, model: &Model, workspace: &'w mut Workspace, state: &[f64]) -> &'w [f64] {
         let dof = model.dof();
         let (q, rest) = state.split_at(dof);

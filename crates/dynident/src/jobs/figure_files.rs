@@ -7,7 +7,7 @@ use dynident_report::PrintStyle;
 use std::path::PathBuf;
 
 impl Figure {
-    /// Writes files in the forms of their endings: all of them, or none if one cannot be drawn.
+    /// Writes files in the formats that their endings define: all of them, or none if one cannot be drawn.
     ///
     /// # Errors
     /// As [`Figure::contents`] and [`FigureForm::of`]; a file that cannot be written.

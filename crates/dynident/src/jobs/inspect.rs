@@ -12,10 +12,10 @@ use dynident_model::{
 };
 use std::path::Path;
 
-/// Knowledge about the robot in addition to its description.
+/// Information about the robot in addition to its description.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InspectSettings {
-    /// Sum of all masses including the base, kg; by default that stated in a comment of the file.
+    /// Sum of all masses including the base, kg; by default the total in a comment of the file.
     pub total_mass_kg: Option<f64>,
 }
 
@@ -32,13 +32,13 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
 pub enum CorrectedDescription {
     /// The URDF with all corrections; all other bytes are unchanged.
     Urdf(String),
-    /// No error with a known correction was found.
+    /// No mistake with a known correction was found.
     NothingToMend,
-    /// Not a URDF (D-H table, MJCF or SDF), which is not corrected.
+    /// The file is a D-H table, MJCF or SDF; only URDF can be corrected.
     NoUrdf,
 }
 
-/// A URDF with the corrections that [`inspect_with`] lists.
+/// Returns a URDF with the corrections that [`inspect_with`] lists.
 ///
 /// # Errors
 /// If the description cannot be read.
@@ -60,7 +60,7 @@ pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<Correct
         .map_err(|error| Error::Result { path: robot.path.clone(), message: error.to_string() })
 }
 
-/// Errors found in a URDF; `None` for other formats.
+/// Mistakes found in a URDF; `None` for other formats.
 fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, Error> {
     if robot.format != DescriptionFormat::Urdf {
         return Ok(None);
@@ -70,7 +70,7 @@ fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, 
     Ok(Some(found.map_err(fault)?))
 }
 
-/// Like [`inspect`] with additional knowledge.
+/// Like [`inspect`], with additional information about the robot.
 ///
 /// # Errors
 /// If the description cannot be read.

@@ -8,19 +8,19 @@ use std::path::Path;
 /// Actions of a LeRobot data set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeRobotActions {
-    /// Names of the actions: `shoulder_pan.pos`.
+    /// Names of the actions, for example `shoulder_pan.pos`.
     pub names: Vec<String>,
     /// Values of each action.
     pub values: Vec<Vec<f64>>,
-    /// How names and units were chosen, in words.
+    /// Description of how names and units were chosen.
     pub notes: Vec<String>,
 }
 
 /// Features of a data set whose entries are positions of joints.
 const FEATURES: [&str; 2] = ["action", "observation.state"];
 
-/// The positions of the joints as actions. Names and units are those of `[format]` if its `command`, or otherwise its
-/// `position`, has columns of a LeRobot data set; without them `JOINT.pos` in degrees (m).
+/// The positions of the joints as actions. If `[format]` has columns of a LeRobot data set in `command`, or otherwise
+/// in `position`, their names and units are used. If not, the names are `JOINT.pos`, in degrees (m).
 ///
 /// # Errors
 /// Columns that do not match the joints, or a matrix.
@@ -32,7 +32,7 @@ pub fn lerobot_actions(
 ) -> Result<LeRobotActions, Error> {
     let joints = robot.model().joints();
     let moved = |name: &String| joints.iter().position(|joint| joint.name == *name);
-    // Columns of a log may belong to joints that are locked.
+    // Columns of a log can belong to locked joints.
     let rest = vec![0.0; positions.first().map_or(0, Vec::len)];
     let of_log: Vec<Vec<f64>> = robot
         .log_joints
@@ -69,7 +69,7 @@ pub fn lerobot_actions(
     })
 }
 
-/// The entry of a feature: `elbow.pos` of `action[elbow.pos]`. `None` for another column.
+/// The entry of a feature: `elbow.pos` in `action[elbow.pos]`. `None` for other columns.
 fn action_name(column: &ColumnRef) -> Option<String> {
     let ColumnRef::Name(name) = column else { return None };
     let (feature, entry) = name.strip_suffix(']')?.split_once('[')?;

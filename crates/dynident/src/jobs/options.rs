@@ -3,9 +3,9 @@
 use dynident_identification::{Execution, Progress};
 use std::path::PathBuf;
 
-/// Execution options of a job; they do not affect the result.
+/// Execution options of a job; they do not influence the result.
 pub struct RunOptions<'a> {
-    /// Folder of the recordings, which overrides that of the study.
+    /// Folder of the recordings, which replaces that of the study.
     pub data: Option<PathBuf>,
     /// Number of threads; the result does not depend on it.
     pub threads: usize,

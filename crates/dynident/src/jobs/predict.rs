@@ -11,15 +11,16 @@ use dynident_online::{OnlineError, StartingPoint, Watch, WatchSettings};
 use nalgebra::{DMatrix, DMatrixView};
 use std::path::Path;
 
-/// Samples per block: enough for full lanes, small enough for the cache.
+/// Number of samples per block: enough for full SIMD lanes, few enough for the cache.
 const BLOCK_SAMPLES: usize = 128;
 
-/// A torque predictor with the model of a result.
+/// Predicts torques with the model of a result.
 ///
-/// The prediction of joint j in one sample is `τ̂_j = W_j θ`, with the base parameters θ of the physically consistent
-/// set if the result has one. Its 95 % band, `± t √(W_j V W_jᵀ + σ_j²)`, is for torque filtered as in the fit: V is the
-/// covariance of the estimate, σ_j the standard deviation of the joint's filtered residual. V contains no variance of
-/// unexcited base parameters, so the band is invalid for motion that needs them.
+/// The prediction for joint j in one sample is `τ̂_j = W_j θ` with the regressor row W_j and the base parameters θ,
+/// which are those of the physically consistent model if the result has one. The 95 % band `± t √(W_j V W_jᵀ + σ_j²)`
+/// is valid for torque that is filtered as in the fit. V is the covariance of the estimate, σ_j the standard
+/// deviation of the joint's filtered residual. V contains no variance of base parameters that the logs do not excite,
+/// so the band is invalid for motion that needs them.
 #[derive(Clone, Debug)]
 pub struct TorquePredictor {
     model: RegressorModel,
@@ -27,7 +28,7 @@ pub struct TorquePredictor {
     covariance: DMatrix<f64>,
     joint_sigma: Vec<f64>,
     width: f64,
-    /// Lowest cut-off of the filters before the residuals, Hz.
+    /// Lowest cut-off frequency of the filters that were applied to the residuals, Hz.
     band_hz: Option<f64>,
 }
 
@@ -36,13 +37,13 @@ pub struct TorquePredictor {
 pub struct PredictedTorque {
     /// Predicted torque.
     pub tau: Vec<f64>,
-    /// Half-width of its 95 % band.
+    /// Half-width of the 95 % band.
     pub half_width_95: Vec<f64>,
 }
 
 impl TorquePredictor {
-    /// Builds the predictor from a result; `result_path` is its name in messages. `study` is the study of the result;
-    /// its robot is also searched in the folder `data`.
+    /// Builds the predictor from a result; `result_path` is the name of the result in messages. `study` is the study
+    /// of the result; the robot file is also searched in the folder `data`.
     ///
     /// # Errors
     /// If the result does not belong to the study's robot, or contains values that are not finite.
@@ -84,7 +85,7 @@ impl TorquePredictor {
         })
     }
 
-    /// Degrees of freedom.
+    /// Number of degrees of freedom.
     pub fn dof(&self) -> usize {
         self.model.dof()
     }
@@ -94,8 +95,8 @@ impl TorquePredictor {
         self.model.joint_names()
     }
 
-    /// Monitors the robot with this model: the reference is θ with the covariance of the estimate, and residuals are
-    /// filtered as in the fit (`band_hz`, unless the settings state it).
+    /// Creates a monitor of the robot with this model. The reference is θ with the covariance of the estimate.
+    /// Residuals are filtered as in the fit (`band_hz`, unless the settings contain it).
     ///
     /// # Errors
     /// As [`Watch::new`].
@@ -105,8 +106,8 @@ impl TorquePredictor {
         Watch::new(self.model.clone(), reference, &self.joint_sigma, &settings)
     }
 
-    /// Predicts the torque along `motion`, whose samples are consecutive (friction with memory starts at rest), with
-    /// its band.
+    /// Predicts the torque along `motion` with its band. The samples must be consecutive; friction with hysteresis
+    /// starts without deflection.
     ///
     /// # Panics
     /// If the motion does not have [`dof`](Self::dof) joints.
@@ -130,7 +131,7 @@ impl TorquePredictor {
         PredictedTorque { tau, half_width_95 }
     }
 
-    /// The torque of [`predict`](Self::predict) alone, joint-major, Nm (N), in a fraction of the time.
+    /// Computes only the torque of [`predict`](Self::predict), joint-major, Nm (N), in a fraction of the time.
     ///
     /// # Panics
     /// As [`predict`](Self::predict).
@@ -138,8 +139,8 @@ impl TorquePredictor {
         self.predicted(motion, |_, _, _| {})
     }
 
-    /// Torque along a motion. `each` receives a joint, a first sample, and the joint's regressor columns of the samples
-    /// from there on.
+    /// Computes the torque along a motion. `each` receives a joint, the index of a first sample, and the joint's
+    /// regressor columns for the samples from there on.
     fn predicted(&self, motion: &JointMotion<'_>, mut each: impl FnMut(usize, usize, &[f64])) -> Vec<f64> {
         let (dof, samples, layout) = (self.dof(), motion.samples, self.model.layout());
         assert_eq!(motion.q.len(), dof * samples, "the motion needs {dof} joints");

@@ -1,4 +1,4 @@
-//! Provenance: input files of a result, and its identity.
+//! Provenance of a result: its input files and its identity.
 
 use crate::digest::hexadecimal;
 use crate::error::Error;
@@ -13,7 +13,7 @@ use std::path::Path;
 const IDENTITY_DIGITS: usize = 12;
 const BLOCK_BYTES: usize = 1 << 16;
 
-/// Provenance of a result of `study`; `read` are the other inputs with their kinds, duplicates allowed.
+/// Provenance of a result of `study`. `read` contains the other inputs with their kinds; duplicates are allowed.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
@@ -30,8 +30,8 @@ pub(crate) fn provenance(study: StudyFile<'_>, read: &[(&'static str, StudyInput
     Ok(identified_by(&study, own, inputs))
 }
 
-/// Provenance of a result made long after study and robot were read: study and robot from `begun`, because the files
-/// may have changed, and the files in `read`.
+/// Provenance of a result that is made long after study and robot were read. Study and robot are taken from `begun`,
+/// because the files may have changed; `read` contains the other files.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
@@ -71,7 +71,7 @@ fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) 
     Provenance { identity, version: version.to_owned(), command: None, content_sha256: None, study: own, inputs }
 }
 
-/// Describes `source` of the kind `what`, with a path relative to the folder of `study`.
+/// Describes the input `source` of the kind `what`, with a path relative to the folder of `study`.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read again.
@@ -88,7 +88,7 @@ pub(crate) fn read_input(what: &str, source: &StudyInput, study: StudyFile<'_>) 
     })
 }
 
-/// [`provenance()`] of a design, simulation or iteration, with further inputs.
+/// Computes the [`provenance()`] of a design, simulation or iteration, with further inputs.
 ///
 /// # Errors
 /// As [`provenance()`].
@@ -110,7 +110,7 @@ fn is_same(a: &StudyInput, b: &StudyInput) -> bool {
     }
 }
 
-/// Computes [`provenance()`] during a job, on a separate thread if more than one is permitted.
+/// Computes the [`provenance()`] during a job, on a separate thread if more than one thread is permitted.
 pub(crate) fn concurrently<R>(
     threads: usize,
     provenance: impl FnOnce() -> Result<Provenance, Error> + Send,
@@ -130,7 +130,7 @@ pub(crate) fn concurrently<R>(
 fn input(what: &str, path: &Path, study: StudyFile<'_>) -> Result<InputFile, Error> {
     let cannot = |path: &Path, source| Error::File { path: path.to_owned(), source };
     let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK_BYTES], 0);
-    // A recording in a folder is hashed part by part.
+    // A recording that is a folder is hashed file by file.
     let parts = dynident_recording::log::files(path).map_err(|error| cannot(path, std::io::Error::other(error)))?;
     for part in parts {
         let mut file = dynident_files::open(&part).map_err(|error| cannot(&part, error))?;

@@ -3,7 +3,7 @@
 use dynident_export::RecordedVelocity;
 use dynident_identification::rows::VelocityHistogram;
 
-/// Velocities of all logs per joint; a log has one histogram per joint, or none.
+/// Velocities of all logs for each joint; a log has one histogram per joint, or none.
 pub(super) fn recorded_velocities<'a>(
     logs: impl Iterator<Item = &'a [VelocityHistogram]>,
     dof: usize,

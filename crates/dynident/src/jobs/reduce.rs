@@ -1,4 +1,4 @@
-//! `reduce`: logs to factors, and factors to a model, for logs in several places.
+//! `reduce`: converts logs to triangular factors, and identifies a model from factors, for logs in several places.
 
 use crate::clock::now;
 use crate::error::{Error, FactorsError};
@@ -24,7 +24,8 @@ pub struct ReduceSettings {
     pub arm: Option<String>,
     /// Time of recording, seconds since 1970-01-01 (UTC).
     pub recorded_at_s: Option<f64>,
-    /// Segments per log. Error bars need many segments if there are few logs, and one if there are many. Default 16.
+    /// Number of time segments per log. If there are few logs, error bars need many segments; if there are many logs,
+    /// one is sufficient. Default 16.
     pub segments: usize,
 }
 
@@ -34,8 +35,8 @@ impl Default for ReduceSettings {
     }
 }
 
-/// Reduces the training logs of a study to factors. Cut-off, friction and lag that the study does not state are those
-/// of `like`, because all logs of a fleet must be processed identically.
+/// Reduces the training logs of a study to triangular factors. If the study does not define cut-off frequency,
+/// friction or lag, those of `like` are used, because all logs of a fleet must be processed identically.
 ///
 /// # Errors
 /// Every variant of [`Error`]; [`IdentificationError::Reduce`] if cut-off or friction are not stated.
@@ -54,7 +55,7 @@ pub fn reduce(
     if let Some(file) = study.torque.iter().find_map(|torque| torque.table_file.as_ref()) {
         return Err(factors(FactorsError::Table { file: file.display().to_string() }));
     }
-    // A design is not used here.
+    // The section `[design]` is not used here.
     let undesigned = Study { design: None, ..study.study.clone() };
     if let Some(part) = undesigned.functions().into_iter().next() {
         return Err(factors(FactorsError::Function { part }));
@@ -74,7 +75,7 @@ pub fn reduce(
     Ok(Factors::new(kind, name_alone(study.path), reduced.into_iter().map(log).collect()))
 }
 
-/// The parts of the study that a model from factors needs, without local paths.
+/// The parts of the study that are needed to identify a model from factors, without local paths.
 fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
     let mut kind = study.clone();
     (kind.log, kind.format, kind.data, kind.source) = (Vec::new(), None, None, None);
@@ -87,9 +88,9 @@ fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
     kind
 }
 
-/// Identifies the model of all logs of `factors`, as [`identify()`](crate::identify()) does from the logs with stated
-/// cut-off, friction and lag. Results that need samples are missing (delays, torque over time, study examination,
-/// held-out logs).
+/// Identifies the model from all logs of `factors`, like [`identify()`](crate::identify()) does from the logs with
+/// given cut-off frequency, friction and lag. Results that need samples are missing: delays, torque over time, study
+/// examination, held-out logs.
 ///
 /// # Errors
 /// As [`identify()`](crate::identify()).
@@ -113,8 +114,8 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     build_outcome(study, &robot, &task, found, metadata)
 }
 
-/// Residual of each log of `factors` with a model's base parameters, percent of the root mean square torque. `None` for
-/// a log without torque.
+/// Residual of each log of `factors` with a model's base parameters, in percent of the root mean square torque.
+/// `None` for a log without torque.
 ///
 /// # Errors
 /// [`Error::Result`] for a model of another robot.
@@ -127,7 +128,7 @@ pub fn factors_errors(factors: &Factors, model: &ResultFile, path: &Path) -> Res
     reduced_errors(&robot.parametric, &theta, &logs).map_err(|error| in_study(error.into()))
 }
 
-/// The logs with unique names: duplicates get digits of their hash.
+/// The logs with unique names: duplicate names are extended by digits of the log's hash.
 fn with_unique_names(factors: &Factors) -> Vec<ReducedLog> {
     const HASH_DIGITS: usize = 8;
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();

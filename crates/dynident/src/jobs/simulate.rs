@@ -19,7 +19,7 @@ use std::path::Path;
 pub struct Simulation {
     /// Content of `truth.json`.
     pub file: SimulationFile,
-    /// The log: `t_s, q1.., tau1..`.
+    /// The log as a table: `t_s, q1.., tau1..`.
     pub log: String,
 }
 

@@ -1,4 +1,4 @@
-//! The samples of a test as tables, for programs that evaluate an exported file on the same samples.
+//! The samples of a validation as tables, for programs that evaluate an exported file on the same samples.
 
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
@@ -11,11 +11,11 @@ use dynident_identification::rows::{
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
-/// One table of CSV for each log of the study, as `validate` uses its samples with the model of `stored`: after the
-/// import, the correction of the lag and the differentiator, and before the parallel filter. Columns are `segment`,
-/// then `q_NAME`, `dq_NAME`, `ddq_NAME`, `tau_NAME` (SI units) and `used_NAME` of each joint NAME of the model (1, or 0
-/// for a sample that the filter masks). Returns the tables by file name, and a description with the filter of each log.
-/// `result_path` is the name of the result in messages.
+/// One CSV table for each log of the study, with the samples that `validate` uses for the model of `stored`: after
+/// the import, the correction of the lag and the differentiator, and before the parallel filter. Columns are
+/// `segment`, then `q_NAME`, `dq_NAME`, `ddq_NAME`, `tau_NAME` (SI units) and `used_NAME` of each joint NAME of the
+/// model (1, or 0 for a sample that the filter excludes). Returns the tables by file name, and a description with the
+/// filter of each log. `result_path` is the name of the result in messages.
 ///
 /// # Errors
 /// As [`validate_result()`](crate::validate_result).
@@ -114,7 +114,7 @@ impl RowConsumer for SampleTable {
 }
 
 impl SampleTable {
-    /// The shortest text that gives the same number.
+    /// Writes the shortest text that parses to the same number.
     fn push(&mut self, value: f64) {
         let _ = write!(self.text, ",{value:?}");
     }

@@ -132,8 +132,8 @@ fn training_logs(
     Ok(problems)
 }
 
-/// Name of the training log with the same content as `input`; `None` if there is no such log, or if parts of that file
-/// were held out.
+/// Name of the training log with the same content as `input`; `None` if there is no such log, or if parts of that
+/// file were held out.
 fn fitted_to<'a>(stored: &'a ResultFile, input: &InputFile) -> Option<&'a str> {
     let inputs = &stored.provenance.as_ref()?.inputs;
     let known = inputs.iter().find(|known| known.what == "log" && known.sha256 == input.sha256)?;

@@ -21,8 +21,8 @@ pub fn view_robot(robot: &Robot, trajectories: &[PathBuf]) -> Result<String, Err
     view_page(robot.model.name(), &robot.model, &RobotAppearance::new(&robot.model, &robot.path), &motions)
 }
 
-/// A page with the robot of a study, the motions of its logs and those of `trajectories`. Positions of a log are those
-/// that a fit uses: after the import and the differentiator.
+/// A page with the robot of a study, the motions of its logs and those of `trajectories`. The positions of a log are
+/// those that a fit uses, after the import and the differentiator.
 ///
 /// # Errors
 /// A study, a log or a table that cannot be read.

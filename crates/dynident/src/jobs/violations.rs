@@ -3,8 +3,8 @@
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
 
-/// Messages about bodies whose mass or pseudo-inertia is not positive, and terms with an inadmissible negative value.
-/// `values` are those of the terms.
+/// Messages about bodies whose mass or pseudo-inertia is not positive, and about terms whose value must not be
+/// negative. `values` contains the values of the terms.
 pub(in crate::jobs) fn violations(
     model: &ParametricModel,
     inertials: &[InertialParameters],

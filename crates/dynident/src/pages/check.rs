@@ -1,4 +1,4 @@
-//! Page section of the study examination: findings and unexplained torque.
+//! Page section about the study examination: findings and unexplained torque.
 
 use crate::result::{CheckFinding, HypothesisResult, StudyCheck};
 use dynident_recording::Level;
@@ -31,7 +31,7 @@ fn tone(finding: &CheckFinding) -> Tone {
     }
 }
 
-/// Unexplained torque of each joint, as written and with the correction.
+/// Unexplained torque of each joint, for the study as written and with the correction.
 fn unexplained_torque(joints: &[String], as_written: &HypothesisResult, best: Option<&HypothesisResult>) -> BarPlot {
     let title = "Unexplained torque with the best physically consistent fit";
     let label = "unexplained torque of the joint, %";

@@ -7,10 +7,11 @@ use crate::error::Error;
 use crate::result::{ChangeExplanation, ChangesFrom, ComparisonFile};
 use dynident_report::{BarPlot, Cell, Heading, Report, Table, Text, Tone, short};
 
-/// Difference in standard deviations above which a parameter is marked: exceeded by 0.3 % without a change.
+/// A parameter is marked if its difference exceeds this number of standard deviations; without a change, 0.3 % of
+/// parameters exceed it.
 const NOTABLE_Z: f64 = 3.0;
 
-/// The page: changes, the robot coloured by them, parameters, masses and friction side by side.
+/// Writes the page: changes, the robot coloured by them, and a comparison of parameters, masses and friction.
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.
@@ -49,14 +50,14 @@ pub fn comparison_page(c: &ComparisonFile, robot: Option<&RobotAppearance>) -> R
     Ok(page.html()?)
 }
 
-/// Probability that a body changed: the sum over the explanations with it.
+/// Probability that a body changed: the sum over all explanations that contain it.
 fn body_probability(changes: &ChangesFrom, body: &str) -> f64 {
     let name = format!("body `{body}`");
     let with = |own: &&ChangeExplanation| own.everything || own.parts.iter().any(|part| part.part == name);
     changes.explanations.iter().filter(with).map(|own| own.probability).sum()
 }
 
-/// An explanation in words, such as ``body `link7`: +0.48 ± 0.03 kg at (0.01, 0, 0.07) m``.
+/// Text of an explanation, such as ``body `link7`: +0.48 ± 0.03 kg at (0.01, 0, 0.07) m``.
 pub fn explanation_words(explanation: &ChangeExplanation) -> String {
     if explanation.everything {
         return "every part changed".to_owned();

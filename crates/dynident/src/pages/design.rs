@@ -91,7 +91,7 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
     Ok(picture.svg()?)
 }
 
-/// Best and mean fitness per generation (the paper's Fig. 7); `None` for a search without generations.
+/// Best and mean fitness per generation; `None` for a search without generations.
 ///
 /// # Errors
 /// A curve that cannot be plotted.
@@ -106,7 +106,7 @@ pub(crate) fn fitness(file: &DesignFile, history: &[Generation]) -> Result<Optio
     Ok(Some(FitnessPicture { title: &title, best: &best, mean: &mean, optimum }.svg()?))
 }
 
-/// Every last body with the position of its outermost link frame.
+/// Every last body of a chain, with the position of its outermost link frame.
 fn tools(model: &Model) -> Vec<(usize, Vec3)> {
     let last = |body: &usize| model.tree_joints().iter().all(|joint| joint.parent != Some(*body));
     let farthest = |body: usize| {

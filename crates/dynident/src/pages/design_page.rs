@@ -12,29 +12,29 @@ use dynident_report::{
     BodyPair, Cell, Gauge, Heading, KeyFigures, LinePlot, Report, Scene, SceneMotion, Table, Text, Tone, short,
 };
 
-/// Largest number of samples of the played motion; the picture interpolates.
+/// Maximum number of samples of the animated motion; the animation interpolates.
 const MAX_SAMPLES: usize = 1500;
 
 /// Number of pairs of links whose distance is shown.
 const MAX_PAIRS: usize = 5;
 
-/// Distance above the minimum one within which two links are near, as a share of the arm's length.
+/// Two links are near if their distance exceeds the minimum one by less than this, as a share of the arm's length.
 const NEAR_SHARE: f64 = 0.1;
 
-/// Share of a limit above which it is marked as nearly reached, %.
+/// Percentage of a limit above which it is marked as nearly reached.
 const NEARLY_REACHED_PERCENT: f64 = 95.0;
 
-/// Times and samples of a designed motion with its torque, if that is known, Nm (N).
+/// Times and samples of a designed motion with its torque (if known), Nm (N).
 pub(crate) struct SampledDesign<'a> {
     pub(crate) times_s: &'a [f64],
     pub(crate) motion: &'a Motion,
     pub(crate) torque: Option<&'a [f64]>,
-    /// Those of [`closest_pairs`].
+    /// The result of [`closest_pairs`].
     pub(crate) pairs: &'a [PairDistance],
 }
 
-/// The page of a design: verdict, the robot that plays the motion with its limits, used limits, forecast of the error
-/// bars, curves of each joint.
+/// Writes the page of a design: verdict, an animation of the robot with its limits, use of limits, forecast of the
+/// error bars, curves of each joint.
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.
@@ -108,12 +108,12 @@ fn key_figures(d: &DesignFile) -> KeyFigures {
         .figure("duration", format!("{} s", short(d.duration_s, 4)), "")
 }
 
-/// Every how many samples of a motion are in the picture.
+/// Interval, in samples, between the samples of a motion that the animation contains.
 fn step_of(motion: &Motion) -> usize {
     motion.samples.div_ceil(MAX_SAMPLES).max(1)
 }
 
-/// The pairs of links that come closest to their minimum distance, the closest first.
+/// The pairs of links that come closest to their minimum distance, closest first.
 ///
 /// # Errors
 /// Invalid limits.

@@ -1,16 +1,16 @@
-//! Differences from the robot description in words.
+//! Differences from the robot description as text.
 
 use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison, ResultFile};
 use dynident_report::short;
 
-/// Probability of an explanation by single bodies from which it is reported.
+/// Minimum probability with which an explanation by single bodies is reported.
 const MIN_REPORTED_PROBABILITY: f64 = 0.5;
 
-/// Probability from which another explanation is listed.
+/// Minimum probability with which an alternative explanation is listed.
 const MIN_ALTERNATIVE_PROBABILITY: f64 = 0.1;
 
-/// One sentence for each fact, if one or two bodies differ from the robot description: which, how much, how certain,
-/// the alternatives, and the edit test. Empty if nothing or everything differs.
+/// If one or two bodies differ from the robot description: one sentence for each fact (which body, by how much, how
+/// certain, the alternatives, and the edit test). Empty if nothing or everything differs.
 pub fn difference_words(r: &ResultFile) -> Vec<String> {
     let Some(found) = &r.description_differences else { return Vec::new() };
     let Some(best) = found.explanations.first() else { return Vec::new() };
@@ -62,7 +62,7 @@ fn alternative(explanation: &ChangeExplanation) -> String {
     format!("{} ({:.0} %)", parts.join(" and "), 100.0 * explanation.probability)
 }
 
-/// Torque error after the body gets the values of the description again.
+/// Edit test: torque error if the body gets the values of the description again.
 fn edit_test(found: &DescriptionComparison, part: &ChangedPart) -> Option<String> {
     let body = found.bodies.iter().find(|body| part.part == format!("body `{}`", body.name))?;
     let (error, most) = body.error_percent.zip(body.error_95_percent)?;

@@ -1,16 +1,16 @@
-//! The model in each class of forms: what is refitted, and the held-out error of each.
+//! The model in each class of export formats: what is fitted again, and the held-out error of each class.
 
 use crate::result::ResultFile;
 use dynident_model::terms::TermClass;
 use dynident_report::{Report, Table};
 
-/// The table of forms; nothing for results without them.
+/// Adds the table of export formats; adds nothing for results without them.
 pub(super) fn forms(page: &mut Report, r: &ResultFile) {
     if r.forms.is_empty() {
         return;
     }
     let percent = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2} %"));
-    // Without friction with memory, code with state is that without.
+    // Without hysteresis friction, code with state equals code without state.
     let shown = r.forms.iter().filter(|form| form.class != TermClass::WithState || form.has_memory());
     let rows = shown.flat_map(|form| {
         // The columns of the table "What each form can hold" of the book (docs/src/export.md).

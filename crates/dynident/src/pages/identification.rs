@@ -19,8 +19,8 @@ use dynident_report::{BarPlot, Cell, Heading, HeatMap, LinePlot, Report, Table, 
 
 const MAX_CORRELATED_PARAMETERS: usize = 80;
 
-/// The page of a stored result with torque over time and a picture of the robot, as
-/// [`IdentificationOutcome::report`](crate::IdentificationOutcome) returns it.
+/// The page of a stored result with torque over time and a picture of the robot, like
+/// [`IdentificationOutcome::report`](crate::IdentificationOutcome).
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.
@@ -154,7 +154,7 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
     }
 }
 
-/// The times of a recorder that was started again, on one axis: time does not decrease.
+/// Converts the times of a recorder that was restarted to one axis, so that time does not decrease.
 fn rising(times: &[f64]) -> Vec<f64> {
     let (mut added, mut before) = (0.0, f64::NEG_INFINITY);
     let continued = |time: &f64| {
@@ -203,7 +203,7 @@ fn largest_error(p: &BaseParameterResult) -> String {
 }
 
 fn parameters(page: &mut Report, r: &ResultFile) {
-    // One plot per unit, with a common scale.
+    // One plot per unit, because parameters in a plot have a common scale.
     let mut units: Vec<&str> = Vec::new();
     for parameter in &r.base_parameters {
         if !units.contains(&parameter.unit.as_str()) {
@@ -255,7 +255,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// Estimates that depend on parameters fixed at nominal values.
+/// Adds estimates that depend on parameters fixed at nominal values.
 fn conditional_estimates(page: &mut Report, r: &ResultFile) {
     let rows = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).map(|p| {
         let on = p.conditional_on.iter().map(|own| format!("{} ({} per unit)", own.on, short(own.per_unit, 3)));
@@ -281,7 +281,7 @@ fn friction(page: &mut Report, r: &ResultFile) {
     let mut table = Table::new("", ["joint", "parameter", "value", "± (95 %)", "unit"]).note(
         "from the physically consistent set if there is one; error bars only for separately identified parameters",
     );
-    // A separately identified term is a base parameter, which has the error bar.
+    // A term that is identified separately is a base parameter; its error bar is the one that is shown.
     let bar = |term: &TermResult| {
         let base = r.base_parameters.iter().find(|p| Some(&p.expression) == term.base_parameter.as_ref());
         base.filter(|p| term.std.is_some() && p.excited).map_or_else(String::new, |p| short(p.half_width_95, 3))
@@ -309,7 +309,7 @@ fn friction(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// Test for drive inertia, with the estimate of each joint.
+/// Adds the test for drive inertia, with the estimate of each joint.
 fn drives(page: &mut Report, r: &ResultFile) {
     let Some(choice) = &r.drive_inertia_choice else { return };
     let row = |drive: &DriveInertiaEstimate| {
@@ -325,7 +325,7 @@ fn drives(page: &mut Report, r: &ResultFile) {
     page.add(Text::new(format!("Drive inertia: {}.", choice.sentence())));
 }
 
-/// A constant of selected friction as text.
+/// A constant of the selected friction as text.
 fn constant(own: &FrictionConstant) -> String {
     let [from, to] = own.interval_95;
     format!("{} {} {} ({} to {})", own.term, own.constant, short(own.value, 3), short(from, 2), short(to, 2))
@@ -350,7 +350,7 @@ fn lags(page: &mut Report, r: &ResultFile) {
     }
 }
 
-/// Meaning of the marks after values of bodies.
+/// Explanation of the marks after the values of bodies.
 const MARKS: &str = "~: identified only in sums; =: not identified, nominal value";
 
 /// Mark of a body's value, in the order of the ten parameters.

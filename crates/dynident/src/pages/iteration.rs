@@ -11,11 +11,11 @@ use crate::error::Error;
 use crate::result::{IterationRun, IterationsFile};
 use dynident_report::{Cell, ConvergencePlot, Heading, KeyFigures, LinePlot, Report, Table, Tone, short};
 
-/// Computing times.
+/// Computing times of an iteration.
 pub(crate) struct TimeSpent {
-    /// Before the first run: robot, base parameters, trajectory design; s.
+    /// Time before the first run (robot, base parameters, trajectory design), s.
     pub(crate) before_runs_s: f64,
-    /// Total without this page, s.
+    /// Total time without this page, s.
     pub(crate) all_s: f64,
     /// Number of new runs.
     pub(crate) runs: usize,
@@ -86,7 +86,7 @@ fn figures(file: &IterationsFile) -> KeyFigures {
     figures
 }
 
-/// Model of the controller of a run.
+/// Description of the model of a run's controller.
 fn model(run: &IterationRun) -> String {
     match (run.model_based, run.model_of_run) {
         (false, _) if run.stiffness == 1.0 => "none".to_owned(),
@@ -156,7 +156,7 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
             let mut plot = LinePlot::new(title, "t, s", "rad (m)", longest.times_s.clone())
                 .note("desired minus measured position")
                 .of_joint(name);
-            // First and last runs; intermediate runs are similar.
+            // First and last runs are shown, because intermediate runs are similar.
             let shown = |place: usize| place + 2 < MAX_CURVES || place + 2 >= own.len();
             for trace in own.iter().enumerate().filter(|(place, _)| shown(*place)).map(|(_, trace)| trace) {
                 let mut error = trace.error[joint].clone();

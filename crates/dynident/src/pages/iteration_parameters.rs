@@ -1,4 +1,4 @@
-//! Parameters on the page of an iteration, with error bars, run by run.
+//! Parameters on the page of an iteration, with error bars, for each run.
 
 use super::run_figures::{HALF_WIDTH_95, MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name};
 use super::unit;
@@ -59,7 +59,7 @@ pub(super) fn add_parameters(page: &mut Report, file: &IterationsFile) {
     page.add(table(file, last, known));
 }
 
-/// Convergence of the parameter errors.
+/// Plots how the errors of the parameters decrease from run to run.
 fn settling_errors(page: &mut Report, file: &IterationsFile) {
     let of = |figure: &dyn Fn(&IterationRun) -> Option<f64>| -> Vec<f64> {
         file.runs.iter().map(|run| figure(run).unwrap_or(f64::NAN)).collect()
@@ -94,7 +94,7 @@ fn settling_errors(page: &mut Report, file: &IterationsFile) {
     page.add(relative);
 }
 
-/// Some parameters of one unit per run: values, or errors if the truth is known.
+/// Plots some parameters of one unit for each run: values, or errors if the true values are known.
 fn by_run(
     file: &IterationsFile,
     of_unit: &str,

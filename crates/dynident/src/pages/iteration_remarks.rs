@@ -4,13 +4,13 @@ use super::run_figures::{last_good, run_name};
 use crate::result::{IterationRun, IterationsFile, UnmetConditionEntry};
 use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
 
-/// Explains held-out runs.
+/// Explanation of held-out runs.
 const HELD_OUT: &str = "Validation motion, run with the newest model in the controller: percentage of each joint's torque inside the 95 % band of the prediction. The result of the iteration uses the last one.";
 
-/// Explains forecasts.
+/// Explanation of forecasts.
 const FORECASTS: &str = "Largest error bars: root mean square of the error bars along the ten least known directions before the run, in terms of the torque uncertainty over the workspace.";
 
-/// Adds unmet conditions of convergence, with remedies.
+/// Adds the unmet conditions of convergence, with suggested fixes.
 pub(super) fn unmet_conditions(page: &mut Report, file: &IterationsFile) {
     let point = |unmet: &UnmetConditionEntry| (Tone::Warning, format!("{}. Remedy: {}.", unmet.message, unmet.remedy));
     section(page, "Unmet conditions", file.unmet.iter().map(point).collect());
@@ -57,7 +57,7 @@ pub(super) fn log_remarks(page: &mut Report, file: &IterationsFile) {
     section(page, "Differentiation of positions", points);
 }
 
-/// One point for each run with a remark.
+/// One entry for each run with a remark.
 fn of_runs(file: &IterationsFile, tone: Tone, point: impl Fn(&IterationRun) -> Option<String>) -> Vec<(Tone, String)> {
     file.runs.iter().filter_map(point).map(|point| (tone, point)).collect()
 }
@@ -82,7 +82,7 @@ fn explained(page: &mut Report, heading: &str, explanation: &str, points: Vec<(T
     }
 }
 
-/// Evidence per joint for the result of the iteration, from the last run that has it.
+/// Evidence for the result of the iteration, joint by joint, from the last run that has it.
 fn last_shown(file: &IterationsFile) -> Option<Table> {
     let run = file.runs.iter().rfind(|run| run.evidence.is_some())?;
     let optional = |value: Option<String>| Cell::from(value.unwrap_or_else(|| "–".to_owned()));

@@ -1,21 +1,22 @@
-//! The robot on the page of an iteration: measured motion of the first and the last run, desired motion as a pale arm.
+//! The robot on the page of an iteration: measured motion of the first and the last run; the desired motion is drawn
+//! as a pale arm.
 
 use super::robot::RobotAppearance;
 use super::run_trace::RunTrace;
 use dynident_report::{Colouring, Gauge, HeatMap, Scene, SceneMotion};
 
-/// Largest number of samples of a played run; the picture interpolates.
+/// Maximum number of samples of an animated run; the animation interpolates.
 const MAX_SAMPLES: usize = 1000;
-/// Parts of a motion for the tracking error by posture.
+/// Number of parts of a motion in the plot of the tracking error by posture.
 const PARTS: usize = 24;
-/// Largest number of runs in the picture of the tracking error by posture.
+/// Maximum number of runs in the plot of the tracking error by posture.
 const MAX_RUNS: usize = 30;
-/// Colours of no error and of the largest error.
+/// Indices of the colours for zero error and for the largest error.
 const BLUE: usize = 0;
 const ORANGE: usize = 1;
 
-/// The robot with the first and the last run of each leg. Its joints are coloured by their tracking error relative to
-/// the largest one of all runs, so that the colours of two runs can be compared.
+/// The robot with the first and the last run of each trajectory. Its joints are coloured by their tracking error
+/// relative to the largest error of all runs, so that the colours of two runs can be compared.
 pub(super) fn scene(robot: &RobotAppearance, traces: &[RunTrace]) -> Option<Scene> {
     let mut scene = robot.scene("The robot, desired and measured");
     let shown = first_and_last(traces);
@@ -39,7 +40,7 @@ pub(super) fn scene(robot: &RobotAppearance, traces: &[RunTrace]) -> Option<Scen
     Some(scene)
 }
 
-/// Traces of the last and the first run of each leg.
+/// Traces of the last and the first run of each trajectory.
 fn first_and_last(traces: &[RunTrace]) -> Vec<&RunTrace> {
     let mut legs: Vec<Option<usize>> = traces.iter().map(|trace| trace.name.leg).collect();
     legs.sort_unstable();
@@ -52,7 +53,7 @@ fn first_and_last(traces: &[RunTrace]) -> Vec<&RunTrace> {
     ends.flatten().collect()
 }
 
-/// The recorded part of a run; `None` without samples.
+/// The recorded part of a run, for the animation; `None` without samples.
 fn played(trace: &RunTrace, all: &[RunTrace]) -> Option<SceneMotion> {
     let recorded = trace.error.iter().map(|error| error.iter().take_while(|error| error.is_finite()).count());
     let samples = recorded.min().filter(|samples| *samples > 1)?;
@@ -86,7 +87,7 @@ fn played(trace: &RunTrace, all: &[RunTrace]) -> Option<SceneMotion> {
     })
 }
 
-/// Largest tracking error of all joints in each part of the motion, run by run, for the runs of one leg.
+/// Largest tracking error of all joints in each part of the motion, run by run, for the runs of one trajectory.
 pub(super) fn by_posture(traces: &[&RunTrace], title: String) -> Option<HeatMap> {
     let runs = &traces[..traces.len().min(MAX_RUNS)];
     let end_s = runs.first()?.times_s.last().copied().filter(|end| *end > 0.0)?;

@@ -3,7 +3,7 @@
 use crate::result::ResultFile;
 use dynident_report::{Report, Table, Text};
 
-/// Version, identity, command and input files.
+/// Adds version, identity, command and input files.
 pub(super) fn origin(page: &mut Report, r: &ResultFile) {
     let Some(provenance) = &r.provenance else { return };
     let command = provenance.command.as_ref().map_or_else(String::new, |command| format!(" by `{command}`"));

@@ -9,7 +9,7 @@ use dynident_model::{Body, InertialParameters, JointKind, Model, Transform, Vec3
 use dynident_report::{BodyMotion, Ellipsoid, Scene, SceneBody, Surface};
 use std::path::{Path, PathBuf};
 
-/// A robot with the folder of its description, which contains the meshes: all that a picture needs.
+/// A robot with the folder of its description, which contains the meshes: all data that a picture needs.
 #[derive(Clone, Debug)]
 pub struct RobotAppearance {
     model: Model,
@@ -17,12 +17,13 @@ pub struct RobotAppearance {
 }
 
 impl RobotAppearance {
-    /// The model of the robot description at `path`.
+    /// Creates the appearance from the model of the robot description at `path`.
     pub fn new(model: &Model, path: &Path) -> Self {
         Self { model: model.clone(), folder: path.parent().unwrap_or(Path::new("")).to_owned() }
     }
 
-    /// The model of a stored result, without shapes; `None` if the result contains no complete model.
+    /// Creates the appearance from the model in a result, without shapes; `None` if the result contains no complete
+    /// model.
     ///
     /// # Errors
     /// A model that cannot be read.
@@ -36,9 +37,9 @@ impl RobotAppearance {
         &self.model
     }
 
-    /// Bodies with the collision shapes of the description, in the neutral posture: every joint at zero, or as close to
-    /// zero as its limits allow. A body without a readable shape is drawn as capsules from joint to joint. The first
-    /// body is the base.
+    /// Bodies with the collision shapes of the description, in the neutral posture: every joint at zero, or as close
+    /// to zero as its limits allow. If a body has no readable shape, it is drawn as capsules from joint to joint. The
+    /// first body is the base.
     pub fn scene(&self, title: impl Into<String>) -> Scene {
         let model = &self.model;
         let posture = neutral_posture(model);
@@ -128,7 +129,7 @@ fn surface_of(shape: &CollisionShape, folder: &Path) -> Result<Surface, MeshErro
             let scaled = |vertex: &Vec3| std::array::from_fn(|axis| scale[axis] * vertex.0[axis]);
             let mut surface =
                 Surface { vertices_m: mesh.vertices.iter().map(scaled).collect(), triangles: mesh.triangles };
-            // A mirrored mesh, or one that is written inside out.
+            // The mesh is mirrored, or its faces point inward.
             if surface.volume_m3() < 0.0 {
                 surface.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
@@ -146,9 +147,9 @@ fn rows(placement: &Transform) -> ([[f64; 3]; 3], [f64; 3]) {
     (placement.rotation.0, placement.translation.0)
 }
 
-/// The solid of uniform density with the mass distribution of a body: with the covariance `C` of its mass about the
-/// centre of mass, the ellipsoid `p = √5 L u + c` over the unit sphere `u`, where `L Lᵀ = C`. `None` without mass or if
-/// the body is not physically consistent.
+/// The solid ellipsoid of uniform density with the mass distribution of a body. With the covariance `C` of the body's
+/// mass about the centre of mass c, it is `p = √5 L u + c` over the unit sphere `u`, where `L Lᵀ = C`. `None` for a
+/// body without mass or if the body is not physically consistent.
 pub(super) fn ellipsoid(parameters: &[f64; 10], earlier: bool) -> Option<Ellipsoid> {
     let body = InertialParameters(*parameters);
     let mass = Some(body.mass_kg()).filter(|mass| *mass > 0.0)?;

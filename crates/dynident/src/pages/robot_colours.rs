@@ -7,17 +7,19 @@ use dynident_identification::Role;
 use dynident_identification::examination::LogTrace;
 use dynident_report::{Colouring, Gauge, Scene, SceneMotion, short};
 
-/// Colour numbers of the page's palette.
+/// Indices of colours in the page's palette.
 const BLUE: usize = 0;
 const ORANGE: usize = 1;
 const GREEN: usize = 2;
 const YELLOW: usize = 4;
 const VIOLET: usize = 6;
 
-/// A body with more than this number of measured values (of ten) is measured; with more nominal ones, nominal.
+/// A body with more than this number of measured values (of ten) is shown as measured; with more nominal values, as
+/// nominal.
 const MOST_VALUES: usize = 5;
 
-/// The robot of a result: how well each body is known, its change from the description, torque errors along the logs.
+/// The robot of a result: how well each body is determined, its change from the description, and torque errors along
+/// the logs.
 pub(super) fn scene(robot: &RobotAppearance, r: &ResultFile, traces: &[LogTrace]) -> Scene {
     let mut scene = robot.scene("The robot");
     let of = |name: &str| r.bodies.iter().find(|body| body.name == name);
@@ -49,11 +51,11 @@ pub(super) fn scene(robot: &RobotAppearance, r: &ResultFile, traces: &[LogTrace]
     scene
 }
 
-/// Colours of the probability that a body changed, by the lowest probability of each class.
+/// Colours for the probability that a body changed, with the lowest probability of each class.
 const CHANGE_CLASSES: [(f64, &str, usize); 3] =
     [(0.5, "probably changed", ORANGE), (0.05, "possibly changed", YELLOW), (0.0, "not changed", GREEN)];
 
-/// Colouring by the probability that each body changed, with words about it; `None` for a body without colour.
+/// Colouring by the probability that each body changed, with a text for each; `None` for a body without colour.
 pub(super) fn change_colouring(name: &str, bodies: &[Option<(f64, String)>]) -> Colouring {
     let class = |probability: f64| CHANGE_CLASSES.iter().position(|(least, ..)| probability >= *least);
     Colouring {
@@ -111,7 +113,7 @@ fn known(bodies: &[Option<&BodyResult>]) -> Colouring {
     }
 }
 
-/// Change of the mass from the description.
+/// Colouring by the change of the mass from the description.
 fn changed(bodies: &[Option<&BodyResult>]) -> Colouring {
     let percent = |body: &BodyResult| {
         let prior = body.prior.filter(|prior| prior[0] > 0.0)?;
@@ -141,7 +143,8 @@ fn changed(bodies: &[Option<&BodyResult>]) -> Colouring {
     }
 }
 
-/// The motion of a log with torque and torque error; the limits of the error are the root mean square of the torque.
+/// The motion of a log with torque and torque error. The colour range of the error is the root mean square of the
+/// torque.
 fn motion(trace: &LogTrace) -> SceneMotion {
     let (measured, predicted) = (&trace.motion.measured_nm, &trace.motion.predicted_nm);
     let error = |(measured, predicted): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {

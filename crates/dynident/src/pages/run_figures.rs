@@ -8,7 +8,7 @@ pub(super) const HALF_WIDTH_95: f64 = 1.96;
 /// Maximum number of distinguishable curves in a plot.
 pub(super) const MAX_CURVES: usize = 6;
 
-/// Run number, with its leg if each leg has a separate iteration.
+/// Number of the run, with its trajectory if each trajectory has a separate iteration.
 pub(super) fn run_name(run: &IterationRun) -> String {
     run.leg.map_or_else(|| run.run.to_string(), |leg| format!("{} of leg {leg}", run.run))
 }
@@ -28,7 +28,7 @@ pub(super) fn worst(run: &IterationRun) -> f64 {
     run.max_tracking_error_rad.iter().fold(0.0, |most, error| most.max(*error))
 }
 
-/// Root mean square parameter error of a run, in standard deviations.
+/// Root mean square of a run's parameter errors, in standard deviations.
 pub(super) fn error_in_bars(run: &IterationRun) -> Option<f64> {
     let squares: Vec<f64> = run
         .parameters

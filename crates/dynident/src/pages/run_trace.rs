@@ -8,9 +8,9 @@ use dynident_simulation::Reference;
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunName {
     pub(crate) run: usize,
-    /// Leg number, if there are several legs.
+    /// Number of the trajectory, if the run has several.
     pub(crate) leg: Option<usize>,
-    /// Index of the leg within the run.
+    /// Index of the trajectory within the run.
     pub(crate) place: usize,
 }
 
@@ -26,7 +26,7 @@ pub(crate) struct RunTrace {
 }
 
 impl RunTrace {
-    /// Reads the log of the run. An unreadable log gives an empty plot, so that the page can still be written.
+    /// Reads the log of the run. If the log is unreadable, the plot is empty, so that the page can still be written.
     pub(crate) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
         let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
         let (motion, rate_hz) = (reference.motion(), reference.rate_hz());
@@ -48,7 +48,7 @@ impl RunTrace {
 fn between(times_s: &[f64], values: &[f64], time_s: f64) -> f64 {
     let after = times_s.partition_point(|time| *time < time_s);
     match (after, times_s.get(after)) {
-        // Tolerates rounding of the last sample time.
+        // Tolerance for rounding of the last sample time.
         (_, None) => times_s.last().filter(|last| time_s - **last < 1e-9).map_or(f64::NAN, |_| values[after - 1]),
         (0, Some(_)) => values[0],
         (_, Some(next)) => {

@@ -6,10 +6,10 @@ use crate::result::{ServoFile, ServoLog, ServoMotion, ServoNumber};
 use dynident_model::Model;
 use dynident_report::{Cell, Heading, LinePlot, Report, SceneMotion, Table, Text, Tone, short};
 
-/// Motions in the picture of the robot.
+/// Number of motions in the picture of the robot.
 const MOST_PLAYED: usize = 3;
 
-/// The page: verdict, errors on each log, the robot with its motion, drives, bodies.
+/// Writes the page: verdict, errors on each log, the robot with its motion, drives, bodies.
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.

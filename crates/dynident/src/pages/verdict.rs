@@ -1,14 +1,14 @@
-//! The head of the report of an identification: its verdict in words, and key figures.
+//! Beginning of the report of an identification: verdict and key figures.
 
 use crate::result::{BaseParameterResult, ResultFile};
 use dynident_estimation::ValidationReport;
 use dynident_identification::examination::LogValidation;
 use dynident_report::{KeyFigures, Text, Tone, short};
 
-/// Error bar relative to the value above which a parameter is poorly known, %.
+/// A parameter is poorly determined if its error bar exceeds this percentage of its value.
 const POORLY_KNOWN_PERCENT: f64 = 30.0;
 
-/// Answers three questions: is the model good, what is poorly known, what should be done next.
+/// Text that answers three questions: is the model good, what is poorly determined, and what should be done next.
 pub(super) fn verdict(r: &ResultFile) -> Text {
     let held_out = r.validation.first().map(|log| exported_report(log).relative_error_percent);
     let first = match held_out {
@@ -112,12 +112,12 @@ pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
         .figure("computing time", format!("{} s", short(r.timings_s.total, 3)), "")
 }
 
-/// Errors of the exported model: the physically consistent set, or the estimate without one.
+/// Errors of the exported model: those of the physically consistent model, or of the estimate if there is none.
 pub(super) fn exported_report(log: &LogValidation) -> &ValidationReport {
     log.physical.as_ref().unwrap_or(&log.model)
 }
 
-/// Describes the model in the figures, and whether it differs significantly from the unconstrained estimate.
+/// Describes which model the figures show, and whether it differs significantly from the unconstrained estimate.
 pub(super) fn model_description(r: &ResultFile) -> Text {
     let Some(fit) = &r.physical.fit else {
         return Text::new("All figures use the unconstrained estimate, because there is no physically consistent set.");

@@ -6,16 +6,16 @@ use dynident_excitation::families::SampledMotion;
 use dynident_model::{JointKind, Model};
 use dynident_report::{Cell, Gauge, Heading, Report, SceneMotion, Table, short};
 
-/// Largest number of samples of a motion; the picture interpolates between them.
+/// Maximum number of samples of a motion; the animation interpolates between them.
 const MAX_SAMPLES: usize = 3000;
 
-/// A motion in continuous pieces, which are played one after the other.
+/// A motion in continuous pieces, which are animated one after the other.
 pub(crate) struct ViewedMotion {
     pub(crate) name: String,
     pub(crate) pieces: Vec<SampledMotion>,
 }
 
-/// The page: the robot with its motions, joints with limits, bodies with masses.
+/// Writes the page: the robot with its motions, joints with limits, bodies with masses.
 ///
 /// # Errors
 /// [`Error::Report`], which indicates a bug.
@@ -48,7 +48,7 @@ fn played(motion: &ViewedMotion, model: &Model) -> SceneMotion {
     let mut lists = [(); 2].map(|()| vec![Vec::new(); model.dof()]);
     for piece in &motion.pieces {
         let (times, samples) = (piece.times_s(), piece.samples());
-        // The first sample of a piece follows the last one of the piece before it.
+        // The first sample of a piece comes after the last sample of the previous piece.
         let start = times_s.last().map_or(0.0, |last| last + (times[1] - times[0]));
         times_s.extend(times.iter().step_by(step).map(|time| start + time - times[0]));
         for (list, values) in lists.iter_mut().zip([&samples.q, &samples.dq]) {

@@ -31,6 +31,11 @@ fn loaded() -> Truth {
 }
 
 fn identified(truth: &Truth, seed: u64) -> (ResultFile, PathBuf) {
+    identified_with(truth, seed, "")
+}
+
+/// With further drive terms.
+fn identified_with(truth: &Truth, seed: u64, terms: &str) -> (ResultFile, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let dof = truth.model.dof();
     for (file, seed) in [("log.csv", seed), ("other.csv", seed + 1)] {
@@ -43,7 +48,7 @@ fn identified(truth: &Truth, seed: u64) -> (ResultFile, PathBuf) {
     }
     let text = format!(
         "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}, {{ file = \"other.csv\", role = \"validate\" }}]\n\
-         drive = {{ friction = \"stated\", viscous = true, coulomb = \"smooth\", offset = true }}\n{}",
+         drive = {{ friction = \"stated\", viscous = true, coulomb = \"smooth\", offset = true{terms} }}\n{}",
         repository(ROBOT).display().to_string(),
         format(dof)
     );
@@ -92,6 +97,44 @@ fn a_joint_with_other_friction_is_named() {
     let (changes, words) = best(&found);
     let joint = &found.friction[3].joint;
     assert_eq!(words, format!("friction and offset of joint `{joint}`"), "{changes:?}");
+}
+
+/// Torque does not distinguish the drive inertia of the first joint from the inertia of the first link.
+#[test]
+fn the_drive_of_the_first_joint_is_listed_beside_the_first_link() {
+    let geared = Truth::near(&repository(ROBOT), 0.0, true);
+    let mut heavier = geared.clone();
+    heavier.drive[0][0] *= 2.0;
+    let with_inertia = ", drive_inertia = true";
+    let results = [identified_with(&geared, 1, with_inertia), identified_with(&heavier, 41, with_inertia)];
+    let found = compare(&results).unwrap();
+    let changes = &found.changes[0];
+    let name = format!("drive inertia of joint `{}`", found.friction[0].joint);
+    let drive = changes.explanations.iter().find(|own| own.parts.len() == 1 && own.parts[0].part == name);
+    let drive = drive.unwrap_or_else(|| panic!("{changes:?}"));
+    assert!(drive.probability > 0.05 * changes.explanations[0].probability, "{changes:?}");
+}
+
+/// No single body is named if all bodies of another robot of this type differ.
+#[test]
+fn bodies_that_all_differ_are_not_named() {
+    for seed in [51, 61] {
+        let mut other = bare();
+        let mut random = Random(seed);
+        let bodies: Vec<_> = other
+            .model
+            .inertials()
+            .iter()
+            .map(|body| {
+                let factor = 1.0 + 0.2 * random.next();
+                InertialParameters(body.0.map(|value| factor * value))
+            })
+            .collect();
+        other.model = other.model.with_inertials(&bodies).unwrap();
+        let found = compare(&[identified(&bare(), 1), identified(&other, seed)]).unwrap();
+        let (changes, _) = best(&found);
+        assert!(changes.explanations[0].everything, "{changes:?}");
+    }
 }
 
 #[test]

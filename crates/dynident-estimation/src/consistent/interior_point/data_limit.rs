@@ -71,9 +71,9 @@ const MAX_PRODUCT_RATIO: f64 = 50.0;
 
 pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) x: &'a DVector<f64>,
-    /// `b − A x`.
+    /// Residual `b − A x`.
     pub(in crate::consistent) left: &'a DVector<f64>,
-    /// q, and λ.
+    /// Slack q of the data limit, and its multiplier λ.
     pub(in crate::consistent) limit: (f64, f64),
     pub(in crate::consistent) certificate: Certificate,
 }

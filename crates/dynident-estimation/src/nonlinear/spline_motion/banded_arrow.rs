@@ -89,7 +89,7 @@ impl BandedArrow {
         out
     }
 
-    /// Adds a matrix of the same bandwidth and arrow whose first unknown is `first` here.
+    /// Adds a matrix of the same bandwidth and arrow; its first unknown is unknown `first` of this matrix.
     pub(super) fn add_part(&mut self, first: usize, part: &Self) {
         let wide = self.bandwidth + 1;
         let sum = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
@@ -100,7 +100,7 @@ impl BandedArrow {
         sum(&mut self.right_corner, &part.right_corner);
     }
 
-    /// Eliminates the band: `B = L Lᵀ`, `W = L⁻¹A`. If B is not positive definite, the error is the number of the
+    /// Eliminates the band: `B = L Lᵀ`, `W = L⁻¹A`. If B is not positive definite, the error is the index of the
     /// first dependent unknown.
     pub(super) fn eliminated(&self) -> Result<Eliminated, usize> {
         let (b, wide, a) = (self.bandwidth, self.bandwidth + 1, self.arrow);
@@ -160,7 +160,7 @@ pub(super) struct Eliminated {
     l: Vec<f64>,
     w: Vec<f64>,
     y: Vec<f64>,
-    /// `D − AᵀB⁻¹A`.
+    /// `D − AᵀB⁻¹A`, the Schur complement of the band.
     pub(super) schur: DMatrix<f64>,
     /// Right-hand side of the arrow after elimination.
     pub(super) right: Vec<f64>,

@@ -4,7 +4,7 @@ use super::banded_arrow::BandedArrow;
 
 /// Number of nonzero functions at one instant.
 pub(super) const ACTIVE: usize = 6;
-/// Coefficients of u⁰ to u⁵ of the functions over one interval, in units of 1/120, in the order of the functions (de
+/// Coefficients of u⁰ to u⁵ of the functions over one interval, in units of 1/120, with the functions in order (de
 /// Boor, A Practical Guide to Splines, IX).
 const PIECES: [[f64; ACTIVE]; ACTIVE] = [
     [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
@@ -19,10 +19,10 @@ const SYMBOL_FREQUENCIES: usize = 4096;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spline {
     pub(super) samples: usize,
-    /// Samples between two knots.
+    /// Number of samples between two knots.
     pub(super) step: usize,
     rate_hz: f64,
-    /// Six functions with first and second derivatives (1/s, 1/s²) for each sample of an interval.
+    /// Values of the six functions, with first and second derivatives (1/s, 1/s²), at each sample of an interval.
     table: Vec<[[f64; ACTIVE]; 3]>,
 }
 
@@ -71,7 +71,7 @@ impl Spline {
         }
     }
 
-    /// Positions minus the spline.
+    /// Measured positions minus the spline.
     pub(super) fn residual(&self, coefficients: &[f64], joint: usize, joints: usize, q: &[f64]) -> Vec<f64> {
         let mut left = Vec::with_capacity(q.len());
         for (interval, q) in q.chunks(self.step).enumerate() {
@@ -105,7 +105,8 @@ impl Spline {
         })
     }
 
-    /// `cᵀ P c`, and `P c` of one joint by function.
+    /// Penalty `cᵀ P c` and its gradient `P c` of one joint by function, for coefficients c and the roughness matrix
+    /// P.
     pub(super) fn penalty(
         &self,
         gram: &[[f64; ACTIVE]; ACTIVE],
@@ -190,14 +191,15 @@ impl Spline {
         sum
     }
 
-    /// Mean logarithm of the nonzero eigenvalues of the roughness matrix, from its symbol (Szegő's limit): the
-    /// normalisation of a prior of that order.
+    /// Mean logarithm of the nonzero eigenvalues of the roughness matrix, from its symbol (Szegő's limit theorem). It
+    /// normalises a prior of that order.
     pub(super) fn mean_log_roughness(&self, order: usize) -> f64 {
         let gram = self.roughness(order);
         // Interior rows are sums along the diagonals.
         let lag = |lag: usize| -> f64 { (0..ACTIVE - lag).map(|k| gram[k][k + lag]).sum() };
         let lags: [f64; ACTIVE] = core::array::from_fn(lag);
-        // Near zero the symbol is a power that rounding hides. It is divided out; its mean logarithm is zero.
+        // Near zero frequency the symbol is a power of the frequency, which rounding hides. The power is divided out;
+        // its mean logarithm is zero.
         let mean = (0..SYMBOL_FREQUENCIES).map(|k| {
             let omega = core::f64::consts::PI * (k as f64 + 0.5) / SYMBOL_FREQUENCIES as f64;
             let symbol = lags[0] + 2.0 * (1..ACTIVE).map(|l| lags[l] * (l as f64 * omega).cos()).sum::<f64>();

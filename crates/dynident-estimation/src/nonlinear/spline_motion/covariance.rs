@@ -128,8 +128,8 @@ impl Panel {
     }
 }
 
-/// Rows of a joint's positions: means over the samples of a torque row, times the root of their number. Faster
-/// position changes carry no information about the parameters.
+/// Position rows of a joint: means over the samples of one torque row, times the root of their number. Faster changes
+/// of position carry no information about the parameters.
 fn positions(
     piece: &Piece<'_>,
     coefficients: &[f64],

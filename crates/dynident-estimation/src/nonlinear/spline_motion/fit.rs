@@ -14,7 +14,7 @@ use crate::error::EstimationError;
 use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
 
-/// Ratio of successive tested times between knots.
+/// Ratio between successive tested knot spacings.
 const SPACING_RATIO: f64 = 1.5;
 /// Minimum number of rows between knots, if the rate allows, so that friction reversals within an interval are
 /// resolved.
@@ -37,7 +37,8 @@ struct State {
     parameters: Vec<f64>,
 }
 
-/// `argmax p(q, τ | motion, θ) p(motion)` over the motion of every joint and the parameters, for any log:
+/// Maximises `p(q, τ | motion, θ) p(motion)` over the motion of every joint and the parameters θ, for any log. This
+/// minimises
 ///
 /// ```text
 ///     Σ_j ‖q_j − B c_j‖²/σ_qj²  +  Σ_j ‖A_j (τ_j − f_j(Bc, Ḃc, B̈c, θ))‖²/σ_τj²  +  Σ_j λ_j ∫ (dʳq_j/dtʳ)² dt
@@ -143,7 +144,7 @@ struct Solved {
 struct Step {
     parameters: Vec<f64>,
     motion: Vec<Vec<f64>>,
-    /// In error bars over all directions.
+    /// Length of the step in error bars over all directions.
     length: f64,
 }
 
@@ -198,8 +199,8 @@ impl Fit<'_> {
         Ok(found)
     }
 
-    /// The state after the longest of the full, half, quarter, ... step with a cost of at most `before`; `None` if
-    /// no step has one.
+    /// Shortens the step (full, half, quarter, ...) until the cost is at most `before`, and returns the state after
+    /// it; `None` if no step has such a cost.
     fn descended<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -245,7 +246,7 @@ fn first_torque_levels(pieces: &[Piece<'_>], residuals: &[Vec<Vec<f64>>], noise:
 /// Pieces with their knots, noise levels of every log, and coefficients of every piece.
 type Beginning<'a> = (Vec<Piece<'a>>, Vec<LogNoise>, Vec<Vec<f64>>);
 
-/// Knots, motion from the positions alone, and its noise levels.
+/// Chooses the knots, and estimates the motion and its noise levels from the positions alone.
 fn begin<'a>(
     problem: &'a SplineMotionProblem,
     settings: &SplineMotionSettings,
@@ -263,7 +264,7 @@ fn begin<'a>(
             let fix = "pieces of one log must have the same rate: use separate log numbers";
             return Err(EstimationError::Setting { setting: "rate_hz", value: other.rate_hz, fix });
         }
-        // The unknowns are shared among the logs by samples.
+        // The maximum number of unknowns is divided among the logs in proportion to their samples.
         let least = (all * joints).div_ceil(settings.max_unknowns).max(2);
         let mut ladder = Vec::new();
         let mut step = settings.max_knot_spacing_s * settings.own_second_s * rate_hz;
@@ -368,9 +369,9 @@ fn torque_levels(
         for joint in 0..own.colours.len() {
             let of_log = pieces.iter().zip(residuals).filter(|(piece, _)| piece.record.log == log);
             let of_joint: Vec<&[f64]> = of_log.map(|(_, r)| r[joint].as_slice()).collect();
-            // From the longest piece: samples between pieces are unknown. Motion and parameters absorb part of the
-            // noise; its expectation is added back (expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc.
-            // B 39 (1977) 1).
+            // The lags are counted within each piece, because samples between pieces are missing. Motion and
+            // parameters absorb part of the noise; its expectation is added back (expectation step of Dempster, Laird
+            // and Rubin, J. R. Statist. Soc. B 39 (1977) 1).
             let rows: usize = of_joint.iter().map(|r| r.len()).sum();
             let taken = &effective.torque[log][joint];
             let product =

@@ -4,7 +4,7 @@ use super::smoothing::Smoothness;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LogNoise {
-    /// By joint.
+    /// Noise and smoothness of the positions, by joint.
     pub(super) positions: Vec<Smoothness>,
     /// σ of the innovation of a row's torque by joint, N m (N).
     pub(super) torque_std: Vec<f64>,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// One uninterrupted piece of a log: measured positions and torques at a constant rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplineRecord {
-    /// Number of the log: pieces of one log share noise and smoothness.
+    /// Index of the log. Pieces of one log share noise levels and smoothness.
     pub log: usize,
     /// Sampling rate.
     pub rate_hz: f64,
@@ -27,7 +27,7 @@ pub struct TorqueSlopes {
     /// Derivative of torque `j` by variable `v` at sample `s`, at `(j · 3 joints + v) · samples + s`; variables are
     /// all positions, then all velocities, then all accelerations.
     pub by_motion: Vec<f64>,
-    /// Numbers of the parameters of each joint's torque.
+    /// Indices of the parameters of each joint's torque.
     pub columns: Vec<Vec<usize>>,
     /// Derivatives of each joint's torque by these parameters, column after column.
     pub by_parameters: Vec<Vec<f64>>,
@@ -38,8 +38,8 @@ pub trait TorqueModel {
     /// Error of the model.
     type Error: From<EstimationError>;
 
-    /// Torques, joint-major, of samples `first..first + motion.samples` of a record; `place` is (record, first).
-    /// Blocks of a record come in order of time, from its first sample on.
+    /// Torques of samples `first..first + motion.samples` of a record, joint-major; `place` is (record, first). The
+    /// blocks of a record are evaluated in order of time, starting with its first sample.
     ///
     /// # Errors
     /// Defined by the model.
@@ -106,9 +106,9 @@ impl SplineMotionProblem {
     }
 }
 
-/// A shorter piece does not determine its motion.
+/// Minimum number of samples of a piece; a shorter piece does not determine its motion.
 const MIN_SAMPLES: usize = 16;
-/// Larger values overflow when squared and summed.
+/// Largest accepted magnitude; larger values would overflow when squared and summed.
 const MAX_MAGNITUDE: f64 = 1e100;
 
 /// Settings of [`spline_motion_least_squares`](crate::spline_motion_least_squares()).
@@ -122,22 +122,23 @@ pub struct SplineMotionSettings {
     /// Method of the reported covariance of whitened rows.
     #[serde(skip)]
     pub covariance: CovarianceMethod,
-    /// Maximum order of the autoregression of a torque's residuals, selected by Schwarz's criterion. Default 4; 0
-    /// assumes white torque noise.
+    /// Maximum order of the autoregression of a torque's residuals; Schwarz's criterion (BIC) selects the order.
+    /// Default 4; 0 assumes white torque noise.
     pub most_autoregression: usize,
     /// The iteration ends at this step length of the parameters, in error bars over all directions. Default 0.03.
     pub tolerance: f64,
     /// Maximum number of steps. Default 30; five to ten are usual.
     pub max_iterations: usize,
-    /// Time scale of the robot relative to a usual arm: a factor of `max_knot_spacing_s` and `max_noise_memory_s`.
-    /// Default 1.
+    /// Time scale of the robot relative to an arm of usual size (about 1.2 m). It multiplies `max_knot_spacing_s` and
+    /// `max_noise_memory_s`. Default 1.
     #[serde(skip)]
     pub own_second_s: f64,
-    /// Longest tested time between knots for a robot of time scale 1, s. Default 0.5.
+    /// Longest tested time between two knots, s, for a robot of time scale 1. Default 0.5.
     #[serde(skip)]
     pub max_knot_spacing_s: f64,
-    /// Longest memory of torque noise for a robot of time scale 1, s: residuals with a longer memory are model errors,
-    /// and whitening them would remove the information of slow motion about the parameters. Default 0.1.
+    /// Longest correlation time of torque noise, s, for a robot of time scale 1. Residuals with a longer correlation
+    /// are model errors; whitening them would remove the information of slow motion about the parameters. Default
+    /// 0.1.
     #[serde(skip)]
     pub max_noise_memory_s: f64,
     /// Seconds between two knots; by default the most likely spacing for the positions.
@@ -198,15 +199,15 @@ impl SplineMotionSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineJointFit {
-    /// Standard deviation of a sample's position, rad (m).
+    /// Standard deviation of the noise of one position sample, rad (m).
     pub position_std: f64,
     /// Standard deviation of the innovation of a row's torque, N m (N).
     pub torque_std: f64,
     /// Coefficients of the autoregression of the torque noise from row to row; empty for white noise.
     pub torque_autoregression: Vec<f64>,
-    /// Order of the derivative of the position that is white noise in the prior.
+    /// Order r of the motion prior: the r-th derivative of the position is white noise.
     pub order: usize,
-    /// Effective number of the motion's functions that positions and torques determine.
+    /// Effective number of spline functions of the motion that positions and torques determine.
     pub used_functions: f64,
 }
 
@@ -216,11 +217,11 @@ pub struct SplineJointFit {
 pub struct SplineLogFit {
     /// Seconds between two knots.
     pub knot_spacing_s: f64,
-    /// Number of functions of every joint's motion.
+    /// Number of spline functions of every joint's motion.
     pub functions: usize,
-    /// Rows of each joint's torque.
+    /// Number of rows of each joint's torque.
     pub rows: usize,
-    /// Number of samples averaged in a row.
+    /// Number of samples averaged in one row.
     pub samples_of_row: usize,
     /// Results by joint.
     pub joints: Vec<SplineJointFit>,
@@ -229,16 +230,16 @@ pub struct SplineLogFit {
 /// Result of [`spline_motion_least_squares`](crate::spline_motion_least_squares()).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SplineMotionEstimate {
-    /// The parameters. The joints of the estimate are channels here: torques, positions and roughness of every log's
-    /// joints, with σ of whitened rows.
+    /// The parameters. The "joints" of this estimate are channels: torque, position and roughness of every joint in
+    /// every log, with σ of whitened rows.
     pub estimate: Estimate,
     /// Positions, velocities and accelerations of every record, joint-major.
     #[serde(skip)]
     pub motion: Vec<[Vec<f64>; 3]>,
     /// Results by log.
     pub logs: Vec<SplineLogFit>,
-    /// Sum of squares for parameters and motion of the start with the final noise.
+    /// Sum of squares for the start values of parameters and motion, with the final noise levels.
     pub cost_at_start: f64,
-    /// Final sum of squares.
+    /// Sum of squares of the result.
     pub cost: f64,
 }

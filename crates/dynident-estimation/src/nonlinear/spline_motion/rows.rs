@@ -1,5 +1,5 @@
 //! Whitened torque rows at given motion and parameters. A row depends on a window of the motion's functions of all
-//! joints and on the parameters.
+//! joints, and on the parameters.
 //!
 //! A row is the mean over a few samples, minus the prediction of the autoregression from previous rows.
 
@@ -29,14 +29,14 @@ pub(super) struct JointRows {
     /// First unknown of the window of each row.
     pub(super) first: Vec<usize>,
     pub(super) width: usize,
-    /// Derivatives by the motion's unknowns, by row.
+    /// Derivatives with respect to the motion's unknowns, by row.
     pub(super) own: Vec<f64>,
-    /// Derivatives by the free parameters, by row.
+    /// Derivatives with respect to the free parameters, by row.
     pub(super) arrow: Vec<f64>,
     pub(super) residual: Vec<f64>,
 }
 
-/// Numbers of the free parameters, and the index of each parameter among them.
+/// Indices of the free parameters, and the position of each parameter among them.
 #[derive(Clone, Debug)]
 pub(super) struct FreeParameters {
     pub(super) free: Vec<usize>,
@@ -84,7 +84,7 @@ impl Piece<'_> {
         &self.record.q[joint * self.samples()..(joint + 1) * self.samples()]
     }
 
-    /// Positions, velocities and accelerations of samples, joint-major.
+    /// Positions, velocities and accelerations of a range of samples, joint-major.
     pub(super) fn motion(&self, coefficients: &[f64], from: usize, count: usize) -> [Vec<f64>; 3] {
         let mut out = [vec![0.0; count * self.joints], vec![0.0; count * self.joints], vec![0.0; count * self.joints]];
         let [q, dq, ddq] = &mut out;
@@ -216,7 +216,8 @@ impl Piece<'_> {
         out
     }
 
-    /// Rows from `new` on minus the prediction of the autoregression; the very first rows are lost.
+    /// Rows from `new` on minus the prediction of the autoregression; the first rows of a piece, which have no
+    /// predecessors, are dropped.
     fn whitened(&self, raw: &JointRows, new: usize, colour: &[f64], parameters: usize) -> JointRows {
         let (order, rows) = (colour.len(), raw.first.len());
         let width = self.window(order).min(self.spline.functions()) * self.joints;

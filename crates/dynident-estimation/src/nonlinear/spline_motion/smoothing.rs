@@ -1,30 +1,31 @@
 //! Motion from positions alone: smoothing splines whose smoothness is selected by the likelihood of the positions.
 //!
-//! `q_t = q(t) + σ e_t` with white e and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener process). The
-//! mean of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`; σ, λ and r follow from the
-//! restricted likelihood. Wahba, Ann. Statist. 13 (1985) 1378; Wecker and Ansley, JASA 78 (1983) 81.
+//! Model: `q_t = q(t) + σ e_t` with white noise e, and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener
+//! process). The mean of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`. Noise σ, penalty
+//! weight λ and order r maximise the restricted likelihood. Wahba, Ann. Statist. 13 (1985) 1378; Wecker and Ansley,
+//! JASA 78 (1983) 81.
 
 use super::banded_arrow::{BandedArrow, dot};
 use super::bspline::{ACTIVE, Spline};
 use rayon::prelude::*;
 
-/// Tested orders r of the white derivative.
+/// Tested orders r of the derivative that is white noise.
 pub(super) const ORDERS: core::ops::RangeInclusive<usize> = 2..=5;
 /// The search ends after this number of consecutive shorter spacings with a lower likelihood.
 const MAX_WORSE_SPACINGS: usize = 3;
-/// Searched decades of λσ², relative to the value at which both terms are equal at the highest frequency. Beyond the
-/// last one both terms do not fit into double precision.
+/// Searched decades of the ratio λσ², relative to the value at which position and roughness terms are equal at the
+/// highest frequency. Beyond the last decade both terms do not fit into double precision.
 const RATIO_DECADES: (i32, i32) = (-6, 11);
 const GOLDEN_SECTION_STEPS: usize = 14;
-/// Lower limit of σ of a position, rad (m): an encoder of 26 bits has steps of 9e-8 rad, and noise-free data have
-/// rounding only.
+/// Lower limit of σ of a position, rad (m): an encoder of 26 bits has steps of 9e-8 rad, and noise-free data contain
+/// only rounding errors.
 pub(super) const MIN_SIGMA: f64 = 1e-7;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Smoothness {
-    /// r: order of the white derivative.
+    /// r: order of the derivative that is white noise.
     pub(super) order: usize,
-    /// λ.
+    /// λ: weight of the roughness penalty.
     pub(super) penalty: f64,
     /// σ of a sample's position, rad (m).
     pub(super) position_std: f64,
@@ -38,9 +39,9 @@ pub(super) struct Smoothed {
     criterion: f64,
 }
 
-/// Returns the next narrower spacing of knots, in samples, after the most likely one for all joints together, and each
-/// joint's motion with it; the narrower one is used because torque resolves accelerations better than positions do.
-/// `positions[joint][piece]`; `ladder` from wide to narrow.
+/// Selects the most likely knot spacing for all joints together, and returns the next narrower spacing, in samples,
+/// with each joint's motion. The narrower spacing is used because torque resolves accelerations better than positions
+/// do. `positions[joint][piece]`; `ladder` contains the tested spacings from wide to narrow.
 pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]) -> (usize, Vec<Smoothed>) {
     let likeliest = |own: &Vec<&[f64]>, step: usize| {
         let pieces: Option<Vec<Rough>> = own.iter().map(|q| Rough::new(q, rate_hz, step)).collect();
@@ -69,7 +70,7 @@ pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]
     (2, Vec::new())
 }
 
-/// Positions of a piece relative to a hardly smoothed spline, so that the remaining numbers are small for any
+/// Positions of a piece relative to a spline with very little smoothing, so that the differences are small for any
 /// smoothness.
 struct Rough {
     spline: Spline,
@@ -77,7 +78,7 @@ struct Rough {
     /// Position offset, which avoids cancellation for a joint far from zero.
     offset: f64,
     coefficients: Vec<f64>,
-    /// `BᵀB` with right-hand side `Bᵀ r`; r is the residual of that spline.
+    /// `BᵀB` with right-hand side `Bᵀ r`; r is the residual of the lightly smoothed spline.
     normal: BandedArrow,
     right: Vec<f64>,
     /// Sum of squares of r.
@@ -103,12 +104,12 @@ impl Rough {
     }
 }
 
-/// Largest λ that double precision allows for positions of that noise.
+/// Largest λ that double precision allows for positions with this noise.
 pub(super) fn most_penalty(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE], position_std: f64) -> f64 {
     unit(spline, gram) * 10.0_f64.powi(RATIO_DECADES.1) / (position_std * position_std)
 }
 
-/// Ratio at which positions and roughness are equal at the highest frequency.
+/// Ratio λσ² at which position and roughness terms are equal at the highest frequency.
 fn unit(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE]) -> f64 {
     let trace = |matrix: &[[f64; ACTIVE]; ACTIVE]| (0..ACTIVE).map(|k| matrix[k][k]).sum::<f64>();
     trace(&spline.products(spline.step)) / trace(gram)
@@ -168,7 +169,7 @@ fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: 
         rough += spline.penalty(gram, &own, 0, 1).0;
         let curved = dot(&step, &piece.normal.product(&step));
         squares += (piece.squares - 2.0 * dot(&step, &piece.right) + curved).max(0.0);
-        // The prior is flat over polynomials as functions, for any number of knots.
+        // The prior is flat over polynomials of the motion, independent of the number of knots.
         log_determinant += solved.log_determinant() + order as f64 * (count as f64).ln();
         samples += piece.samples;
         functions += count;

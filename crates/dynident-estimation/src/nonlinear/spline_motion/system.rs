@@ -1,5 +1,5 @@
-//! Normal equations of motion and parameters with the motion eliminated, and the effective number of unknowns of each
-//! source of information.
+//! Normal equations of motion and parameters with the motion eliminated. Also the effective number of unknowns that
+//! positions, torques and the motion prior each determine.
 
 use super::banded_arrow::{BandedArrow, Eliminated, InverseBand, axpy, dot};
 use super::noise::LogNoise;
@@ -20,7 +20,7 @@ const MAX_LEVEL_RATIO: f64 = 10.0;
 #[derive(Clone, Debug)]
 pub(super) struct TorqueInformation {
     matrix: BandedArrow,
-    /// Some unwhitened rows of each joint in groups of `lags + 1` consecutive rows, the latest last.
+    /// A sample of unwhitened rows of each joint, in groups of `lags + 1` consecutive rows, the latest last.
     some: Vec<JointRows>,
     lags: usize,
 }
@@ -69,7 +69,7 @@ pub(super) struct System {
 }
 
 impl System {
-    /// Information of the torque with that of positions and smoothness at these noise levels.
+    /// Combines the information of the torque with that of positions and smoothness at these noise levels.
     pub(super) fn new(
         pieces: &[Piece<'_>],
         torques: &[TorqueInformation],
@@ -205,12 +205,13 @@ impl Inverse {
     }
 }
 
-/// Effective number of unknowns that each source of information determines, by log and joint.
+/// Effective number of unknowns that each source of information (torque, positions, motion prior) determines, by log
+/// and joint.
 #[derive(Clone, Debug)]
 pub(super) struct EffectiveUnknowns {
     pub(super) position: Vec<Vec<f64>>,
     pub(super) smoothness: Vec<Vec<f64>>,
-    /// Mean covariance, for each lag, of the torque predictions of rows at that distance.
+    /// Mean covariance of the torque predictions of two rows, for each lag between the rows.
     pub(super) torque: Vec<Vec<Vec<f64>>>,
 }
 

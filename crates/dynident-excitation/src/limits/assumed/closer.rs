@@ -1,4 +1,4 @@
-//! Convex pieces instead of hulls, for links whose hulls come closer than their meshes.
+//! Convex pieces instead of convex hulls, for links whose hulls come closer to each other than their meshes.
 
 use super::super::error::LimitError;
 use super::super::link_points::link_place;
@@ -14,7 +14,7 @@ use dynident_model::{Model, Transform, Vec3};
 
 const POSTURES: usize = 256;
 
-/// Maximum distance of the pieces beyond the mesh, as a share of the clearance.
+/// Maximum distance by which the pieces extend beyond the mesh, as a share of the clearance.
 const MAX_RELATIVE_GAP: f64 = 0.1;
 
 /// Convex pieces of the links that need them. `solids` are the shapes of all links, `hulls` their simplified forms.
@@ -43,7 +43,7 @@ pub(super) fn closer_shapes(
     Ok(closer)
 }
 
-/// Links with meshes that violate the clearance only because of their hulls, in the order of the shapes.
+/// Links with meshes whose hulls violate the clearance although the meshes do not, in the order of the shapes.
 fn links_too_coarse(
     model: &Model,
     solids: &[(String, Solid)],

@@ -12,9 +12,9 @@ use dynident_model::{Model, Transform};
 
 const POSTURES: usize = 256;
 
-/// Assumed floor below a machine on its base: at z = 0 of the base frame, or at the lowest point of the base's
-/// own shapes if that is lower; with the sentence for the report. The inner error is the reason why no floor is
-/// assumed.
+/// Assumed floor below a machine that stands on its base, with the sentence for the report. The floor is at z = 0 of
+/// the base frame, or at the lowest point of the base's own shapes if that is lower. The inner error is the reason
+/// why no floor is assumed.
 pub(super) fn assumed_floor(
     model: &Model,
     shapes: &ShapesOfLinks,
@@ -41,7 +41,8 @@ pub(super) fn assumed_floor(
     let solids = LinkSolid::gather(model, &shapes.shapes, "the floor")?;
     let at = Transform::IDENTITY;
     let base = solids.iter().filter(|solid| solid.body.is_none());
-    // A capsule that replaces the shapes of the base ends at its frame; its radius is not part of the base.
+    // If a capsule replaces the shapes of the base, the capsule ends at the base frame; its radius is not part of the
+    // base.
     let real = |solid: &&LinkSolid| !shapes.stand_ins.contains(&solid.link);
     let plane_m = base.filter(real).map(|solid| solid.lowest(&at).0).fold(0.0, f64::min);
     let mut workspace = Workspace::new(model);

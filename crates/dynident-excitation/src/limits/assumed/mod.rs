@@ -1,5 +1,5 @@
-//! Limits that are assumed where neither the study nor the robot description defines them, and the list of what is not
-//! checked.
+//! Limits that are assumed where neither the study nor the robot description defines them, and the list of possible
+//! violations that are not checked.
 //!
 //! All assumptions scale with the machine: lengths with the arm's length, accelerations with its speeds.
 
@@ -31,19 +31,19 @@ pub struct AssumedLimits {
     pub floor: bool,
     /// Minimum distance between links. Default true.
     pub self_collision: bool,
-    /// Acceleration of every joint with a velocity limit: full speed is reached within 0.2 rad from rest, or within a
-    /// tenth of the stroke of a prismatic joint. Default true.
+    /// Whether the acceleration of every joint with a velocity limit is limited: the joint reaches full speed from
+    /// rest within 0.2 rad, or within a tenth of the range of a prismatic joint. Default true.
     pub acceleration: bool,
-    /// Margin to each position limit of the robot description, percent of half the range. Default 5.
+    /// Margin to each position limit of the robot description, in percent of half the position range. Default 5.
     pub stop_margin_percent: f64,
-    /// Maximum number of convex pieces of the mesh of a collision shape whose convex hull is too coarse. Default 8; 1
-    /// keeps the hulls.
+    /// Maximum number of convex pieces into which the mesh of a collision shape is cut if its convex hull is too
+    /// coarse. Default 8; 1 keeps the hulls.
     pub mesh_pieces: usize,
-    /// Maximum number of turns between the start of the motion and any position of a revolute joint without position
-    /// limits. With a `start_posture` the range extends by this number to either side of it, otherwise by half of it to
-    /// either side of home, or of zero. 0 means no limit. Default 1.
+    /// Range, in turns, of a revolute joint without position limits. With a `start_posture` the joint may move by
+    /// this number of turns to either side of it, otherwise by half of this number to either side of the home
+    /// position, or of zero. 0 means no limit. Default 1.
     pub continuous_turns: f64,
-    /// Thresholds of the assumptions; not part of study files.
+    /// Thresholds of the assumptions; they are not part of study files.
     #[serde(skip)]
     pub thresholds: AssumptionThresholds,
 }
@@ -80,7 +80,7 @@ impl AssumedLimits {
 /// All limits of an experiment, and a description of their origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitsInForce {
-    /// Limits of the robot description and the assumptions, overridden by the study.
+    /// Limits of the robot description and assumed limits; limits given in the study replace both.
     pub limits: Limits,
     /// Assumptions, each with the key that changes it.
     pub assumed: Vec<String>,
@@ -89,8 +89,8 @@ pub struct LimitsInForce {
 }
 
 impl LimitsInForce {
-    /// Combines the limits of the robot description, the assumptions that `settings` selects, and `given`, which has
-    /// priority. `starts` are the positions around which joints without position limits turn.
+    /// Combines the limits of the robot description, the assumptions that `settings` selects, and the limits `given`,
+    /// which have priority. `starts` contains the positions around which joints without position limits may turn.
     ///
     /// # Errors
     /// Errors of [`Limits::validate`] for the shapes and `given`; a threshold out of range.
@@ -153,7 +153,7 @@ impl LimitsInForce {
             && over.shapes.is_empty()
             && settings.floor
         {
-            // The study's height applies to the shapes of all links.
+            // A floor height given in the study applies to the shapes of all links.
             floor::over_all_shapes(model, shapes, floor)?;
         }
         not_checked.extend(self_collision_gaps(model, shapes, &limits)?);
@@ -187,7 +187,7 @@ fn assumed_self_collision(
     Ok((limit, words))
 }
 
-/// Narrows the position ranges; returns whether a range was narrowed.
+/// Narrows the position ranges by the margin to the limits of the description; returns whether a range was narrowed.
 fn keep_from_stops(under: &mut Limits, given: &Limits, margin: f64) -> bool {
     let mut any = false;
     for limit in &mut under.joints {
@@ -205,7 +205,8 @@ fn keep_from_stops(under: &mut Limits, given: &Limits, margin: f64) -> bool {
     any
 }
 
-/// Limits accelerations by velocities where the study has no acceleration limit; returns whether one was added.
+/// Limits accelerations in proportion to the velocity limits where the study has no acceleration limit; returns
+/// whether a limit was added.
 fn bound_accelerations(under: &mut Limits, given: &Limits, model: &Model, thresholds: &AssumptionThresholds) -> bool {
     let mut any = false;
     let none = JointLimit::default();
@@ -235,7 +236,7 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
     };
     let mut gaps = vec!["adjacent links against each other".to_owned()];
     let resolved = limit.resolve(model)?;
-    // Complete lists, because the user must know every unchecked pair.
+    // Complete lists of pairs, because the user must know every pair that is not checked.
     let pairs = |pairs: &[[String; 2]]| pairs.iter().map(|[a, b]| format!("{a} / {b}")).collect::<Vec<_>>().join(", ");
     if !resolved.left_out.is_empty() {
         gaps.push(format!(
@@ -252,7 +253,7 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
     Ok(gaps)
 }
 
-/// Joints that follow more joints than a torque term can act on, and whose friction, inertia or spring is omitted.
+/// Joints that follow more joints than a torque term can act on. Their friction, inertia or spring is omitted.
 fn follower_gaps(model: &Model) -> Option<String> {
     let left_out = |(place, joint): &(usize, &Joint)| {
         let drivers = model.drivers(*place).filter(|(_, share)| *share != 0.0).count();

@@ -1,4 +1,4 @@
-//! Collision shapes of a robot's links, or capsules instead.
+//! Collision shapes of a robot's links, or capsules where shapes are missing or unusable.
 
 use super::super::error::LimitError;
 use super::super::pairs::arm_length_m;
@@ -10,8 +10,8 @@ use dynident_model::collision::Solid;
 use dynident_model::{Link, Model};
 use std::path::Path;
 
-/// Radius of a capsule that replaces the shapes of a link, as a share of the arm's length; that of the tubes of a UR10
-/// or an iiwa.
+/// Radius of a capsule that replaces the shapes of a link, as a share of the arm's length: about the radius of the
+/// tubes of a UR10 or an iiwa.
 pub const CAPSULE_RADIUS_SHARE: f64 = 0.04;
 
 /// Shapes of all links.
@@ -22,8 +22,8 @@ pub struct ShapesOfLinks {
     /// Links with a capsule from joint to joint: all links of a robot description without shapes, and links with an
     /// unusable shape.
     pub stand_ins: Vec<String>,
-    /// Links without a shape in a robot description that has shapes elsewhere: links with a mass, and one link of each
-    /// body without shapes.
+    /// Links without a shape in a robot description that has shapes for other links: links with a mass, and one link
+    /// of each body without shapes.
     pub without: Vec<String>,
     /// Unusable shapes, each with its link, file and reason.
     pub dropped: Vec<String>,
@@ -74,9 +74,9 @@ impl ShapesOfLinks {
         found
     }
 
-    /// The shapes with meshes cut into convex pieces where their convex hulls are too coarse, and the links of these
-    /// meshes. Hulls are too coarse if two links come closer than `clearance_m` by their hulls but not by their
-    /// triangles, in the neutral posture or in more than a share of the random ones.
+    /// Shapes in which meshes with too coarse convex hulls are cut into convex pieces; also returns the links of
+    /// these meshes. Hulls are too coarse if two links come closer than `clearance_m` by their hulls but not by their
+    /// triangles, in the neutral posture or in more than a given share of random postures.
     ///
     /// # Errors
     /// Errors of [`Limits::validate`](super::super::description::Limits::validate) for the shapes.
@@ -87,7 +87,7 @@ impl ShapesOfLinks {
         settings: &AssumedLimits,
     ) -> Result<(Vec<LinkShape>, Vec<String>), LimitError> {
         let mut shapes = self.shapes.clone();
-        // A link with a capsule instead of an unusable shape keeps it.
+        // A link whose unusable shape was replaced by a capsule keeps the capsule.
         let is_whole = |(link, _): &&(String, Solid)| !self.stand_ins.contains(link);
         let solids: Vec<(String, Solid)> = self.solids.iter().filter(is_whole).cloned().collect();
         let closer = closer_shapes(model, &solids, &self.shapes, clearance_m, settings)?;

@@ -10,16 +10,17 @@ pub struct AssumptionThresholds {
     pub clearance_share: f64,
     /// Angle within which a revolute joint reaches its full speed, rad. Default 0.2.
     pub run_up_rad: f64,
-    /// Distance within which a prismatic joint reaches its full speed, as a share of its stroke. Default 0.1.
+    /// Distance within which a prismatic joint reaches its full speed, as a share of its position range. Default 0.1.
     pub run_up_stroke_share: f64,
-    /// Maximum angle between gravity and the base's -z, as a sine, for which the base plane is a floor. Default 0.17
-    /// (10 degrees).
+    /// Largest sine of the angle between gravity and the base's -z axis at which the base plane is assumed to be a
+    /// floor. Default 0.17 (10 degrees).
     pub max_gravity_tilt: f64,
-    /// Depth below the base in the neutral posture, as a share of the arm's length, above which a machine is assumed to
-    /// hang. Default 0.25.
+    /// Depth below the base in the neutral posture, as a share of the arm's length. A machine that extends deeper is
+    /// assumed to hang. Default 0.25.
     pub max_depth_below_base: f64,
-    /// Maximum share of the random postures in which two hulls violate the clearance but their meshes do not; above it
-    /// meshes are cut into convex pieces. Smaller shares do not keep a search from good motions. Default 0.05.
+    /// Largest accepted share of random postures in which the hulls of two links violate the clearance although their
+    /// meshes do not. Above it the meshes are cut into convex pieces. A smaller share hardly restricts the search.
+    /// Default 0.05.
     pub max_hull_only_share: f64,
 }
 

@@ -34,7 +34,7 @@ pub(super) fn bound_turns(
             continue;
         }
         let known = |of: &[Option<f64>]| of.get(place).copied().flatten();
-        // With half of the turns around a free start, any two positions are at most `turns` apart.
+        // With half of the turns to either side of a free start, any two positions are at most `turns` apart.
         let (about, reach) = match known(&starts.start) {
             Some(start) => (start, 2.0 * PI * turns),
             None => (known(&starts.home).unwrap_or(0.0), PI * turns),

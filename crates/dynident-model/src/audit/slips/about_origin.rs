@@ -1,14 +1,14 @@
 //! Moments about the frame's origin instead of the centre of mass.
 //!
 //! If moments are about the origin, a consistent body remains after subtracting the parallel-axis term. If they are
-//! about the centre of mass, this is rare: of 190 links of published descriptions whose term is at least 0.3 of the
-//! trace, 14 remain consistent, all with a term of at most 0.61 of the trace.
+//! about the centre of mass, this is rare. Of 190 links of published descriptions whose parallel-axis term is at
+//! least 0.3 of the trace, 14 remain consistent, all with a term of at most 0.61 of the trace.
 
 use super::{Search, SlipKind, is_possible, parallel_axis, trace, upper_triangle};
 use crate::urdf::StatedInertial;
 
-/// Accepts the mistake if all tested links, at least two, remain consistent bodies; otherwise only for links with a
-/// large share.
+/// Reports the mistake if all tested links, at least two, remain consistent bodies. Otherwise it is reported only for
+/// links with a large share of the parallel-axis term.
 pub(super) fn find(search: &mut Search) {
     let shares: Vec<(usize, f64, Option<StatedInertial>)> = search
         .with_mass()
@@ -24,7 +24,7 @@ pub(super) fn find(search: &mut Search) {
         .collect();
     let tested = shares.iter().filter(|(_, share, _)| *share >= search.settings.min_parallel_axis_share);
     let (leave, of) = tested.fold((0, 0), |(leave, of), (_, _, rest)| (leave + usize::from(rest.is_some()), of + 1));
-    // Links with a small parallel-axis term come from the same exporter.
+    // Links with a small parallel-axis term are included, because they come from the same exporter.
     let all = leave >= 2 && leave == of;
     let members: Vec<&(usize, f64, Option<StatedInertial>)> = shares
         .iter()

@@ -1,10 +1,10 @@
 //! Finds the mistake in a URDF that explains impossible or implausible inertials, and computes the intended numbers.
 //!
-//! Hypotheses are tried in a fixed order, because mistakes can occur together: slots and signs of the numbers
-//! ([`NegatedMoments`](SlipKind::NegatedMoments) to [`LowerTriangle`](SlipKind::LowerTriangle)), units, reference point
-//! of the moments, then comparison with other links and a stated total. Each hypothesis uses the numbers corrected by
-//! the previous ones. A mistake is corrected only if exactly one hypothesis explains the numbers, and if the corrected
-//! body has no finding of the audit that the stated one does not have.
+//! Hypotheses are tested in a fixed order, because mistakes can occur together: slots and signs of the numbers
+//! ([`NegatedMoments`](SlipKind::NegatedMoments) to [`LowerTriangle`](SlipKind::LowerTriangle)), units, reference
+//! point of the moments, then comparison with other links and with a total mass in the file. Each hypothesis uses the
+//! numbers corrected by the previous ones. A mistake is corrected only if exactly one hypothesis explains the
+//! numbers. The corrected body must also have no finding of the audit that the original body does not have.
 
 mod about_origin;
 mod defaults;
@@ -28,21 +28,21 @@ use nalgebra::Matrix3;
 pub enum SlipKind {
     /// All moments (or the mass) have the wrong sign.
     NegatedMoments,
-    /// Products of inertia have the sign of the other convention, which makes the body impossible.
+    /// Products of inertia have the opposite sign convention, which makes the body impossible.
     NegatedProducts,
     /// A full 3 x 3 matrix, read row by row, was written into the six slots of the upper triangle.
     RowMajor,
     /// A lower triangle, read row by row, was written into the slots of the upper triangle.
     LowerTriangle,
-    /// Millimetres or grams instead of metres and kilograms.
+    /// Millimetres or grams were used instead of metres and kilograms.
     Units,
-    /// Moments about the frame's origin instead of the centre of mass.
+    /// Moments are about the frame's origin instead of the centre of mass.
     AboutOrigin,
-    /// An exporter's default of 1.
+    /// An exporter wrote its default of 1.
     Defaults,
-    /// Masses do not add up to the stated total.
+    /// Masses do not add up to the total mass in the file.
     TotalMass,
-    /// A mirrored link has different values than its twin.
+    /// A mirrored link has different values from its counterpart.
     Twins,
     /// An impossible body that none of these mistakes explains, or that several explain.
     Unexplained,
@@ -73,7 +73,7 @@ pub struct DescriptionError {
     pub kind: SlipKind,
     /// Affected links.
     pub links: Vec<String>,
-    /// Problem and, where the file does not determine the correct numbers, what to do.
+    /// Problem. If the file does not determine the correct numbers, also what to do.
     pub message: String,
     /// Evidence in numbers.
     pub evidence: String,
@@ -106,7 +106,7 @@ pub struct Slips {
 }
 
 /// Searches the inertials of a URDF, whose model is `model`, for mistakes. `total_kg` is the known total mass, if
-/// available; a comment of the form `total mass 12.3 kg` in the file is also used.
+/// available; a comment such as `total mass 12.3 kg` in the file is also used.
 ///
 /// # Errors
 /// Invalid URDF.
@@ -114,7 +114,7 @@ pub fn slips(text: &str, model: &Model, total_kg: Option<f64>) -> Result<Slips, 
     slips_with(text, model, total_kg, &SlipSettings::default())
 }
 
-/// As [`slips`], with other thresholds, which have to be [valid](SlipSettings::validate).
+/// Like [`slips`], with other thresholds, which must be [valid](SlipSettings::validate).
 ///
 /// # Errors
 /// Invalid URDF.
@@ -145,13 +145,14 @@ struct Search {
     /// Size of each link's body, m; `None` if all joints are implausibly far apart, so that no length is available for
     /// comparison.
     lengths: Option<Vec<f64>>,
-    /// Whether each link belongs to a moving body. The size of the others is not that of the joints' distances.
+    /// Whether each link belongs to a moving body. The size of other links does not follow from the distances between
+    /// joints.
     moves: Vec<bool>,
     found: Vec<DescriptionError>,
 }
 
 impl Search {
-    /// Records a mistake and applies its corrections, given as index and new numbers of each link.
+    /// Records a mistake and applies its corrections, which are given as index and new numbers of each link.
     fn note(&mut self, kind: SlipKind, message: String, evidence: String, changed: Vec<(usize, StatedInertial)>) {
         let links = changed.iter().map(|(place, _)| self.now[*place].link.clone()).collect();
         let mut corrections = Vec::new();
@@ -217,7 +218,7 @@ fn is_possible(moments: &[f64; 6]) -> bool {
     least >= -1e-9 * trace(moments).abs() && most - least - middle <= TRIANGLE_TOLERANCE * most
 }
 
-/// Ascending.
+/// Principal moments, ascending.
 fn principal(inertia: &[f64; 6]) -> [f64; 3] {
     let [xx, xy, xz, yy, yz, zz] = inertia;
     let matrix = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
@@ -244,7 +245,7 @@ fn parallel_axis(stated: &StatedInertial) -> Mat3 {
     (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(stated.mass_kg)
 }
 
-/// `value · 10^power`, computed on decimal digits so that 12.3 and -3 give exactly 0.0123.
+/// Computes `value · 10^power` on decimal digits, so that 12.3 and -3 give exactly 0.0123.
 fn scaled_by_power(value: f64, power: i32) -> f64 {
     let text = format!("{value:e}");
     let exact = text.split_once('e').and_then(|(digits, exponent)| {

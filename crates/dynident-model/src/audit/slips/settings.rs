@@ -9,17 +9,17 @@ pub struct SlipSettings {
     /// Minimum share of the parallel-axis term in the trace of the inertia at which a link is tested for moments about
     /// its origin. Default 0.3.
     pub min_parallel_axis_share: f64,
-    /// Share at which one link alone is sufficient evidence. The default of 0.7 is above the maximum of 0.61 of 190
-    /// published links.
+    /// Share at which one link alone is sufficient evidence. The default of 0.7 is above 0.61, the maximum among 190
+    /// correct published links.
     pub sufficient_parallel_axis_share: f64,
-    /// Relative tolerance of a stated total mass, which is rounded and often excludes screws. Default 0.015.
+    /// Relative tolerance of a total mass in the file, which is rounded and often excludes screws. Default 0.015.
     pub total_mass_tolerance: f64,
     /// Relative tolerance of the total after a correction of one mass; stricter, because many corrections are tried.
     /// Default 0.003.
     pub corrected_mass_tolerance: f64,
     /// Relative tolerance between mirrored links; CAD programs differ by some tenths of a percent. Default 0.02.
     pub twin_tolerance: f64,
-    /// Maximum number of differing values at which the others still identify the mirror plane. Default 3.
+    /// Maximum number of differing values for which the remaining values still identify the mirror plane. Default 3.
     pub max_differing_values: usize,
     /// Typical decimal logarithm of the radius of gyration over the body length. Default -0.45.
     pub typical_log10_gyration: f64,
@@ -38,8 +38,8 @@ pub struct SlipSettings {
     /// Smallest plausible median distance of the centres of mass after a change of their unit, in body lengths.
     /// Default 0.005.
     pub min_corrected_com_lengths: f64,
-    /// Margin of the best hypothesis about units, decades: a second one within it makes the result ambiguous.
-    /// Default 0.4.
+    /// Minimum distance between the best and the second-best hypothesis about units, decades; if they are closer, the
+    /// result is ambiguous. Default 0.4.
     pub min_misfit_margin: f64,
     /// Distance between two joints, m, above which lengths are implausible, so that units are not tested. Default 10.
     pub max_joint_offset_m: f64,

@@ -10,8 +10,8 @@ struct Interpretation {
     evidence: String,
 }
 
-/// Tries all interpretations for every impossible link. If several explain a link, the one that explains most links of
-/// the file is used, provided it is unique.
+/// Tests all interpretations for every impossible link. If several explain a link, the one that explains most links
+/// of the file is used, if it is unique.
 pub(super) fn find(search: &mut Search) {
     let broken: Vec<usize> = (0..search.now.len()).filter(|&place| !is_body(&search.now[place])).collect();
     let interpretations: Vec<Vec<Interpretation>> =
@@ -113,7 +113,8 @@ fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
     if products.map(|x| x + 0.0) != stated.moments && is_possible(&products) {
         way(SlipKind::NegatedProducts, stated.mass_kg, products.map(|x| x + 0.0), true);
     }
-    // In a matrix written row by row, ixy is repeated in the slot of iyy, and the true iyy (large) is in that of iyz.
+    // In a matrix written row by row, ixy is repeated in the slot of iyy, and the true iyy (large) is in the slot of
+    // iyz.
     if yy == xy && yz > 0.0 && yz.abs() > zz.abs() {
         // Any izz between |xx - yy| and xx + yy is possible if the upper left block is positive definite.
         let middle = (xx * xx + yz * yz).sqrt();

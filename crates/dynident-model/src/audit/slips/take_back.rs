@@ -1,12 +1,12 @@
-//! Takes back corrections that do not lead to a plausible body.
+//! Undoes corrections that do not lead to a plausible body.
 
 use super::{Search, StatedInertial};
 use crate::audit::inertials::findings_of_link;
 use crate::inertial::InertialParameters;
 use crate::spatial::Vec3;
 
-/// Restores the stated numbers of each link whose corrected inertial has a finding of the audit that the stated one
-/// does not have, unless the stated one has a worse finding: the hypothesis does not explain the numbers. A mistake
+/// Restores the original numbers of a link whose corrected inertial has a finding of the audit that the original does
+/// not have: the hypothesis does not explain the numbers. Exception: the original has a worse finding. A mistake
 /// without remaining corrections is removed.
 pub(super) fn implausible(search: &mut Search, stated: &[StatedInertial]) {
     for (place, original) in stated.iter().enumerate() {
@@ -35,7 +35,7 @@ pub(super) fn implausible(search: &mut Search, stated: &[StatedInertial]) {
     }
 }
 
-/// In the axes of `<origin>`, which the plausibility of a body does not depend on.
+/// Inertial in the axes of `<origin>`; the plausibility of a body does not depend on the axes.
 fn inertial(stated: &StatedInertial) -> InertialParameters {
     let com = stated.axes.transpose_mul_vec(Vec3(stated.com_m));
     InertialParameters::from_centre_of_mass(stated.mass_kg, com, &stated.inertia())

@@ -1,9 +1,9 @@
-//! Masses that do not add up to a stated total.
+//! Masses that do not add up to the total mass in the file.
 
 use super::{Search, SlipKind, scaled_by_power, trace};
 use crate::urdf::StatedInertial;
 
-/// Units of a total, with the power of ten to kilograms.
+/// Units of a total mass, with the power of ten that converts to kilograms.
 const UNITS: [(&str, i32); 2] = [("kg", 0), ("g", -3)];
 
 pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
@@ -29,7 +29,7 @@ pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
         search.note(SlipKind::TotalMass, message, evidence, all);
         return;
     }
-    // One mass with a misplaced decimal point.
+    // Hypothesis: one mass has a misplaced decimal point.
     let mut ways: Vec<(usize, i32)> = Vec::new();
     for (place, one) in search.now.iter().enumerate().filter(|(_, one)| one.mass_kg > 0.0) {
         let powers = [-3, -2, -1, 1, 2, 3];
@@ -46,7 +46,7 @@ pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
                 .map(|power| (place, power)),
         );
     }
-    // A duplicated link.
+    // Hypothesis: a link is duplicated.
     let twice: Vec<usize> = (0..search.now.len())
         .filter(|&place| {
             let one = &search.now[place];
@@ -84,8 +84,8 @@ pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
     }
 }
 
-/// Whether the correction brings the radius of gyration over link length closer to that of the other links. This check
-/// is needed because among ten links and six powers one matches a total by chance often enough.
+/// Whether the correction brings the ratio of radius of gyration to link length closer to that of the other links.
+/// This check is needed because with ten links and six powers of ten, one of them often matches a total by chance.
 fn improves_gyration(search: &Search, place: usize, power: i32) -> bool {
     let Some(lengths) = &search.lengths else { return true };
     let figure = |place: usize| {
@@ -104,7 +104,7 @@ fn scaled(stated: &StatedInertial, power: i32) -> StatedInertial {
     StatedInertial { mass_kg: scaled_by_power(stated.mass_kg, power), ..stated.clone() }
 }
 
-/// The total in a comment: `total mass` or `total weight`, then a number and its unit.
+/// The total mass in a comment: `total mass` or `total weight`, then a number and its unit.
 fn stated_in_comment(text: &str) -> Option<f64> {
     let mut rest = text;
     while let Some(start) = rest.find("<!--") {

@@ -27,7 +27,7 @@ pub(super) fn find(search: &mut Search) {
             search.note_uncorrected(SlipKind::Twins, &[left, right], message, evidence);
             continue;
         }
-        // The possible one of the two gives the values of the other.
+        // If one of the two bodies is possible, its values are used for the other.
         let (good, wrong, place) = if bodies[0] { (&a, &b, right) } else { (&b, &a, left) };
         let mut meant = numbers(wrong);
         for &k in &differing {
@@ -38,7 +38,7 @@ pub(super) fn find(search: &mut Search) {
             wrong.link, good.link
         );
         let new = with_numbers(wrong, meant);
-        // This explains the link, so that its earlier `Unexplained` entry is removed.
+        // This explains the link, so its earlier `Unexplained` entry is removed.
         search.found.retain(|slip| !(slip.kind == SlipKind::Unexplained && slip.links == [wrong.link.clone()]));
         search.note(SlipKind::Twins, message, evidence, vec![(place, new)]);
     }
@@ -60,8 +60,8 @@ fn pairs(stated: &[StatedInertial]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// `name` with the word `left` replaced by `right`; `None` if `left` does not occur as a word. Long words may be part
-/// of other words.
+/// `name` with the word `left` replaced by `right`; `None` if `left` does not occur as a word. Long words are also
+/// found inside other words.
 fn replaced(name: &str, left: &str, right: &str) -> Option<String> {
     if left.len() > 2 {
         return name.contains(left).then(|| name.replace(left, right));
@@ -97,7 +97,7 @@ fn with_numbers(of: &StatedInertial, numbers: [f64; 10]) -> StatedInertial {
 }
 
 /// The reflection (signs of the axes) with the fewest differing numbers: sign of each number, and indices of the
-/// differing ones.
+/// differing numbers.
 fn mirror(a: &StatedInertial, b: &StatedInertial, tolerance: f64) -> ([f64; 10], Vec<usize>) {
     let (of_a, of_b) = (numbers(a), numbers(b));
     let size = trace(&a.moments).abs().max(trace(&b.moments).abs());

@@ -1,14 +1,14 @@
 //! Millimetres and grams.
 //!
-//! Three figures are compared with the distances between the joints (`L`, size of the link's body): radius of gyration
-//! `√(½ tr I / m)` over L, mass over L³, and distance of the centre of mass over L. In published descriptions of arms
-//! and humanoids the medians are 0.26 to 0.44 (1.7 with many wheels and fingers), 10 to 500 kg/m³, and at most 0.5;
-//! single centres of mass are up to 4.5 L away.
+//! Three figures are compared with the distances between the joints (`L`, size of the link's body): radius of
+//! gyration `√(½ tr I / m)` over L, mass over L³, and distance of the centre of mass over L. In published
+//! descriptions of arms and humanoids, the median of the first is 0.26 to 0.44 (1.7 with many wheels and fingers), of
+//! the second 10 to 500 kg/m³, and of the third at most 0.5. Single centres of mass are up to 4.5 L away.
 
 use super::{Search, SlipKind, SlipSettings, scaled_by_power, trace};
 use crate::urdf::StatedInertial;
 
-/// A hypothesis about units, as powers of ten to kg, m and kg m².
+/// A hypothesis about units, as powers of ten that convert to kg, m and kg m².
 struct Units {
     what: &'static str,
     mass: i32,
@@ -40,7 +40,7 @@ impl Units {
     }
 }
 
-/// Tests all links together; if their figures are plausible, tests each link alone.
+/// Tests all links together. If their figures are plausible, tests each link alone.
 pub(super) fn find(search: &mut Search) {
     let Some(lengths) = search.lengths.clone() else { return };
     let is_tested = |place: &usize| search.moves[*place] && search.now[*place].moments != DEFAULT_MOMENTS;
@@ -49,7 +49,7 @@ pub(super) fn find(search: &mut Search) {
         return;
     }
     for place in places {
-        // Sensors and frames often have an arbitrary mass for the simulator.
+        // Links of sensors and frames often have an arbitrary mass for the simulator.
         let one = Figures::of(core::iter::once((search.now[place].clone(), lengths[place])));
         if one.density < search.settings.link_log10_density_range[0] {
             continue;
@@ -83,7 +83,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
         {
             let message = format!("{whose}: {}: write kg, m and kg m^2", units.what);
             let evidence = format!("{stated}; in kg, m and kg m^2, {figures}");
-            // If all links are tested, links without moments get the same units.
+            // If all links are tested together, links without moments get the same units.
             let all: Vec<usize> = (0..search.now.len()).collect();
             let changed = if single { places } else { &all };
             let changed: Vec<(usize, StatedInertial)> = changed
@@ -110,7 +110,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
     true
 }
 
-/// The three figures of a set of links; decimal logarithms except for the last.
+/// The three figures of a set of links; decimal logarithms, except for the last figure.
 struct Figures {
     gyration: f64,
     density: f64,
@@ -124,14 +124,14 @@ impl Figures {
             gyrations.push((0.5 * trace(&stated.moments) / stated.mass_kg).sqrt().log10() - length.log10());
             densities.push(stated.mass_kg.log10() - 3.0 * length.log10());
             let distance = stated.com_m.iter().map(|x| x * x).sum::<f64>().sqrt() / length;
-            // Many links have their frame at the centre of mass.
+            // Distances of zero are ignored: many links have their frame at the centre of mass.
             distances.extend((distance > 0.0).then_some(distance));
         }
         let com = if distances.is_empty() { 0.0 } else { median(distances) };
         Self { gyration: median(gyrations), density: median(densities), com }
     }
 
-    /// Distance to published robots, decades; `None` outside their range.
+    /// Distance from the figures of published robots, decades; `None` outside the range of their figures.
     fn misfit(&self, settings: &SlipSettings, single: bool, com_changed: bool) -> Option<f64> {
         let (gyration_range, density_range) = if single {
             (settings.link_log10_gyration_range, settings.link_log10_density_range)

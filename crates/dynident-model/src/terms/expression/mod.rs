@@ -36,16 +36,17 @@ pub(super) const MAX_VALUE: f64 = 1e12;
 #[cfg_attr(feature = "schema", schemars(with = "String"))]
 #[serde(try_from = "String", into = "String")]
 pub struct Expression {
-    /// Operations, each after its operands; the last one is the value.
+    /// Operations; each comes after its operands, and the last one gives the value.
     nodes: Vec<ExpressionNode>,
 }
 
 impl Expression {
     /// Reads an expression.
     ///
-    /// `+ - * / ^`, parentheses, numbers, `pi`; `sin cos tan asin acos atan sinh cosh tanh exp ln sqrt abs` of one
-    /// value, `atan2 min max` of two. `q` and `dq` are position and velocity of the joint itself, `q3` those of the
-    /// third joint, `q(elbow)` or `q("elbow joint")` those of a joint by its name. An exponent is a number.
+    /// Syntax: `+ - * / ^`, parentheses, numbers, `pi`; `sin cos tan asin acos atan sinh cosh tanh exp ln sqrt abs`
+    /// of one argument, `atan2 min max` of two. `q` and `dq` are position and velocity of the joint itself, `q3` the
+    /// position of the third joint, `q(elbow)` or `q("elbow joint")` the position of a joint by its name. An exponent
+    /// must be a number.
     ///
     /// # Errors
     /// Syntax error with its character and the expected element; more than 10 000 characters or 256 operations.
@@ -53,7 +54,7 @@ impl Expression {
         parse::parse(text, joints).map(|nodes| Self { nodes })
     }
 
-    /// Operations, each after its operands; the last one is the value.
+    /// Operations; each comes after its operands, and the last one gives the value.
     pub fn nodes(&self) -> &[ExpressionNode] {
         &self.nodes
     }

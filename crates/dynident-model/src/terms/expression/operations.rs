@@ -63,7 +63,7 @@ pub enum ExpressionFunction {
 /// Functions of two arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExpressionFunction2 {
-    /// Angle of the point (second, first) from the first axis.
+    /// Angle of the point (x, y) = (second, first) from the x axis.
     Atan2,
     /// The smaller value.
     Min,
@@ -72,7 +72,7 @@ pub enum ExpressionFunction2 {
 }
 
 impl ExpressionFunction {
-    /// All of them.
+    /// All functions of one argument.
     pub const ALL: [Self; 13] = [
         Self::Sin,
         Self::Cos,
@@ -147,7 +147,7 @@ impl ExpressionFunction {
 }
 
 impl ExpressionFunction2 {
-    /// All of them.
+    /// All functions of two arguments.
     pub const ALL: [Self; 3] = [Self::Atan2, Self::Min, Self::Max];
 
     /// Name in expressions.
@@ -160,7 +160,7 @@ impl ExpressionFunction2 {
     }
 }
 
-/// Value of an operation, given `values` of the previous ones; positions and velocities give zero here.
+/// Value of an operation, given the `values` of all previous operations. Positions and velocities give zero here.
 pub(super) fn value(node: ExpressionNode, values: &[f64]) -> f64 {
     match node {
         ExpressionNode::Number(number) => number,
@@ -211,7 +211,7 @@ pub(super) fn slopes(node: ExpressionNode, values: &[f64], mut add: impl FnMut(u
             add(a, values[b] / square);
             add(b, -values[a] / square);
         }
-        // For equal values, the first operand.
+        // If the values are equal, the slope of the first operand is used.
         ExpressionNode::Call2(ExpressionFunction2::Min, a, b) => add(if values[b] < values[a] { b } else { a }, 1.0),
         ExpressionNode::Call2(ExpressionFunction2::Max, a, b) => add(if values[b] > values[a] { b } else { a }, 1.0),
     }

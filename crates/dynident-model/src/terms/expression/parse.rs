@@ -4,7 +4,7 @@ use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode,
 use super::{MAX_OPERATIONS, MAX_VALUE};
 use thiserror::Error;
 
-/// Maximum length, characters; longer than the maximum number of operations with all digits of their numbers.
+/// Maximum length, characters; sufficient for the maximum number of operations with all digits of their numbers.
 const MAX_CHARACTERS: usize = 10_000;
 const MAX_SHOWN_CHARACTERS: usize = 2000;
 /// Maximum nesting of parentheses, functions and signs, each of which uses a stack frame.
@@ -15,9 +15,9 @@ const MAX_INTEGER_EXPONENT: f64 = 64.0;
 /// Names of joints in an expression.
 #[derive(Clone, Copy, Debug)]
 pub struct JointNames<'a> {
-    /// The joint whose position and velocity are `q` and `dq`.
+    /// Index of the joint whose position and velocity are `q` and `dq`.
     pub own: Option<usize>,
-    /// Names of the joints; if empty, joints have numbers only, without an upper limit.
+    /// Names of the joints; if empty, joints have only numbers, without an upper limit.
     pub names: &'a [String],
 }
 
@@ -28,7 +28,7 @@ pub struct JointNames<'a> {
 pub struct ExpressionError {
     /// The expression.
     pub text: String,
-    /// Place, in characters from 1.
+    /// Position of the mistake, in characters from 1.
     pub character: usize,
     /// The error, with the fix.
     #[source]
@@ -90,7 +90,7 @@ pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<Expressio
 struct Parser<'a> {
     characters: Vec<char>,
     at: usize,
-    /// Start of the current word, which is the place of a fault.
+    /// Start of the current word; an error is reported at this position.
     begin: usize,
     depth: usize,
     nodes: Vec<ExpressionNode>,
@@ -112,7 +112,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The next character that is not a space; it becomes the place of a fault.
+    /// The next character that is not a space; an error would be reported at this position.
     fn peek(&mut self) -> Option<char> {
         while self.characters.get(self.at).is_some_and(|c| c.is_whitespace()) {
             self.at += 1;
@@ -322,7 +322,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Parses a name after `q(`, up to `)` or in quotes.
+    /// Parses the name of a joint after `q(`, up to `)` or in quotes.
     fn joint_by_name(&mut self) -> Parsed {
         let quote = self.peek().filter(|c| matches!(c, '"' | '\''));
         self.at += usize::from(quote.is_some());
@@ -349,7 +349,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// Value of operations without joints; `first` is the index of the first operation.
+/// Value of operations that contain no joints; `first` is the index of the first operation.
 fn number_of(nodes: &[ExpressionNode], first: usize) -> Option<f64> {
     if nodes.iter().any(|node| matches!(node, ExpressionNode::Position(_) | ExpressionNode::Velocity(_))) {
         return None;

@@ -23,14 +23,14 @@ impl fmt::Display for Expression {
     }
 }
 
-/// Text of an operation. Every operand is used once, so its text is moved.
+/// Text of an operation. Every operand is used only once, so its text is moved instead of copied.
 fn written(node: ExpressionNode, texts: &mut [(String, Precedence)]) -> (String, Precedence) {
     let mut part = |place: usize, least: Precedence| {
         let (text, strength) = core::mem::replace(&mut texts[place], (String::new(), Precedence::Atom));
         if strength >= least { text } else { format!("({text})") }
     };
     match node {
-        // A signed number is not an atom: `-2^x` differs from `(-2)^x`.
+        // A number with a minus sign needs parentheses as an operand: `-2^x` differs from `(-2)^x`.
         ExpressionNode::Number(x) => {
             (format!("{x:?}"), if x.is_sign_negative() { Precedence::Sign } else { Precedence::Atom })
         }

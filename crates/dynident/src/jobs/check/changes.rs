@@ -1,4 +1,4 @@
-//! Study keys that correct a mistake.
+//! Changes of study keys that correct a mistake.
 
 use crate::result::StudyChange;
 use crate::study::{Study, StudyRobot};

@@ -7,7 +7,7 @@ use dynident_recording::log::{ChannelGroup, ColumnRef, Columns, OneOrMany};
 use dynident_recording::{CommandCheckSettings, CommandFinding, LogFormat, RecordingError, check_commands};
 use dynident_text::quoted;
 
-/// Largest number of decimals of an offset, rad or m.
+/// Maximum number of decimals of an offset in a study, rad or m.
 const OFFSET_DECIMALS: usize = 4;
 
 /// Whether a training log has commands and no torque, so that nothing can be identified from torques.
@@ -16,7 +16,7 @@ pub(super) fn is_without_torque(study: &Study) -> bool {
     training.into_iter().any(|index| study.format_of(index).torque.is_none())
 }
 
-/// Findings about the commands of all logs that have them. A finding of several logs appears once.
+/// Findings about the commands of all logs that have commands. A finding of several logs appears once.
 ///
 /// # Errors
 /// If a log cannot be read.
@@ -72,7 +72,7 @@ pub(super) fn command_findings(
     Ok(found.into_iter().map(with_logs).collect())
 }
 
-/// Kind of a finding, as for logs with torque where such a kind exists.
+/// Code of a finding; the same code as for logs with torque where there is one.
 fn kind(finding: &CommandFinding) -> &'static str {
     match finding {
         CommandFinding::Sign { .. } => "sign",
@@ -82,7 +82,8 @@ fn kind(finding: &CommandFinding) -> &'static str {
     }
 }
 
-/// The same correction of the position: commands and positions only show that one of both is wrong.
+/// The corresponding correction of the position, because commands and positions only show that one of the two is
+/// wrong.
 fn of_position(finding: &CommandFinding, format: &LogFormat, table: &str, joints: usize) -> Option<String> {
     let position = &format.position;
     let line = match finding {
@@ -103,11 +104,11 @@ fn of_position(finding: &CommandFinding, format: &LogFormat, table: &str, joints
     ))
 }
 
-/// The keys that correct a mistake in a format of `joints` joints; empty if no key does.
+/// The keys that correct a mistake in a log format of `joints` joints; empty if no key does.
 fn changes(finding: &CommandFinding, format: &LogFormat, table: &str, joints: usize) -> Vec<StudyChange> {
     let Some(command) = &format.command else { return Vec::new() };
     let change = |group: &str, line: String| StudyChange { table: format!("{table}.{group}"), line };
-    // A matrix couples the columns: no value of one column corrects a joint.
+    // A matrix couples the columns, so no value of a single column corrects a joint.
     let has_matrix = command.matrix.is_some() || command.inverse_matrix.is_some();
     match finding {
         CommandFinding::Sign { joint, .. } if !has_matrix => {
@@ -142,7 +143,7 @@ fn changes(finding: &CommandFinding, format: &LogFormat, table: &str, joints: us
             };
             groups.iter().map(|(name, group)| change(name, unit(group))).collect()
         }
-        // Columns in two files are exchanged by hand.
+        // Columns in two different files must be exchanged by hand.
         CommandFinding::Exchanged { .. } if format.position.file.is_none() && command.file.is_none() => {
             vec![change("position", columns(command)), change("command", columns(&format.position))]
         }

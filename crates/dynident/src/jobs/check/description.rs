@@ -1,4 +1,4 @@
-//! Findings on the robot description: its units, its masses, or another robot.
+//! Findings about the robot description: units, masses, or the description of another robot.
 
 use super::wording::{FindingContext, finding};
 use crate::result::{CheckFinding, StudyChange};
@@ -6,7 +6,8 @@ use dynident_identification::diagnosis::{DescriptionFit, WrongMass};
 use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 
-/// Torque magnitude that differs from the robot description's: another torque unit, or another unit of the masses.
+/// The torque magnitude differs from that of the robot description: another torque unit, or another unit of the
+/// masses.
 pub(super) fn torque_unit(
     fit: &DescriptionFit,
     far: &[usize],
@@ -17,7 +18,7 @@ pub(super) fn torque_unit(
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
     let common = fit.common_unit();
-    // An implausible robot description is reported instead of the torque unit.
+    // If the robot description is implausible, this is reported instead of the torque unit.
     let audited = audit(model);
     let of_inertia = |found: &&AuditFinding| found.check == "inertia-too-large";
     let most_have_it = 2 * audited.iter().filter(of_inertia).count() > model.bodies().len();
@@ -35,7 +36,7 @@ pub(super) fn torque_unit(
     }
     let scales = || far.iter().filter_map(|&joint| fit.scale[joint]);
     let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
-    // A single joint may have one wrong body.
+    // A difference at a single joint can also come from one wrong body.
     let is_alone = far.len() == 1 && joints.len() > 1;
     if is_alone || (common.is_none() && most > thresholds.max_factor_ratio * least) {
         return finding(
@@ -74,7 +75,8 @@ pub(super) fn torque_unit(
     found
 }
 
-/// One body of the robot description is far too heavy or too light. Base parameters are not affected, nominal ones are.
+/// One body of the robot description is far too heavy or too light. Base parameters are not affected, but nominal
+/// parameters are.
 pub(super) fn wrong_mass(wrong: &WrongMass, model: &Model) -> CheckFinding {
     let name = model.bodies()[wrong.body].name();
     let mass_kg = model.inertials()[wrong.body].mass_kg();
@@ -92,7 +94,7 @@ pub(super) fn wrong_mass(wrong: &WrongMass, model: &Model) -> CheckFinding {
     CheckFinding { level: Level::Warning, ..found }
 }
 
-/// The bodies of the robot description explain no joint's torque, while other consistent bodies do.
+/// The bodies of the robot description do not explain the torque of any joint, while other consistent bodies do.
 pub(super) fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
     let best = fit.best_explained().map_or_else(String::new, |(joint, share)| {
         format!("{:.0} % of the torque of `{}`, the largest share of all joints", 100.0 * share, joints[joint])

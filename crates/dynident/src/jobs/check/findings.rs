@@ -48,7 +48,7 @@ pub(super) fn study_check(
     if let Some(fit) = bodies.filter(|_| has_stated_gains && foreign.is_none() && !is_spoilt) {
         findings.extend(words.wrong_scale(fit, robot.model()));
     }
-    // The iteration judges its held-out runs; they are not logs of the study.
+    // The iteration evaluates its held-out runs separately; they are not logs of the study.
     let payloads = diagnosis.unmodelled_payloads.iter().filter(|payload| payload.log < study.log.len());
     findings.extend(payloads.map(|payload| unmodelled_payload(study, robot, payload)));
     let held_out = diagnosis.held_out.iter().filter(|found| found.log < study.log.len());
@@ -88,7 +88,8 @@ fn explanation<'a>(search: &'a Search, thresholds: &CheckSettings) -> Option<&'a
 }
 
 impl FindingContext<'_> {
-    /// One finding per mistake of the best hypothesis; the last finding lists indistinguishable hypotheses.
+    /// One finding per mistake of the best hypothesis. The last finding lists hypotheses that cannot be distinguished
+    /// from it.
     fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
         let Self { joints, keys, .. } = self;
         let one = |(number, mistake): (usize, &Mistake)| {
@@ -104,8 +105,8 @@ impl FindingContext<'_> {
         best.mistakes.iter().enumerate().map(one).collect()
     }
 
-    /// Finding for the robot description of another robot. The best hypothesis is listed only as an alternative,
-    /// because some mistake always explains slightly more.
+    /// Finding for the description of a different robot. The best hypothesis is mentioned only as an alternative,
+    /// because some mistake always explains slightly more than none.
     fn another_robot(self, fit: &DescriptionFit, best: Option<&Hypothesis>) -> CheckFinding {
         let Self { joints, keys, .. } = self;
         let mut found = another_robot(fit, joints);
@@ -143,10 +144,10 @@ fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
     )
 }
 
-/// Most of the torque is unexplained although no tested mistake explains more of it.
+/// Finding if most of the torque is unexplained although no tested mistake explains more of it.
 ///
-/// A warning, because friction and position noise of an honest log can cause it: `check` fits at a few hundred
-/// instants.
+/// It is only a warning, because friction and position noise of a correct log can cause it: `check` fits at a few
+/// hundred instants.
 fn mostly_unexplained(diagnosis: &Diagnosis, joints: &[String]) -> CheckFinding {
     let search = &diagnosis.search;
     let believed = search.believed();
@@ -167,7 +168,7 @@ fn mostly_unexplained(diagnosis: &Diagnosis, joints: &[String]) -> CheckFinding 
     CheckFinding { level: Level::Warning, ..found }
 }
 
-/// A share in percent; a share above ten is not meaningful as a number.
+/// A share as text in percent; above 1000 % the number itself is not meaningful.
 fn percent(share: f64) -> String {
     if share > 10.0 { "more than 1000 %".to_owned() } else { format!("{:.0} %", 100.0 * share) }
 }
@@ -207,7 +208,7 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
     Some(found)
 }
 
-/// Torque columns that do not contain what the study states; other hypotheses are not reliable then.
+/// Torque columns that do not contain what the study states; other hypotheses are then not reliable.
 fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
     let same = |same: &DuplicateChannel| {
         let [a, b] = same.joints.map(|joint| &joints[joint]);
@@ -254,7 +255,7 @@ fn of_held_out_log(
     found
 }
 
-/// A joint torque that does not fit the robot identified from all joints.
+/// Finding about a joint torque that does not fit the robot identified from all joints.
 fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckFinding {
     let name = &joints[torque.joint];
     if torque.is_motionless() {
@@ -320,14 +321,14 @@ fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPay
     );
     let is_trained = |log: &usize| study.log[*log].role == Role::Identify;
     let loaded = if payload.mass_kg > 0.0 { vec![payload.log] } else { study.logs_of_role(Role::Identify) };
-    // Without a training log that carries it, a payload cannot be estimated together with the arm.
+    // If no training log contains the payload, the payload cannot be estimated together with the arm.
     let known = (!loaded.iter().any(is_trained)).then_some((payload.mass_kg, payload.com_m));
     found.write = payload_section(link, known);
     found.write.extend(loaded.into_iter().map(carries_tool));
     found
 }
 
-/// Unexplained torque of a joint that is a function of its position.
+/// Finding about unexplained torque of a joint that is a function of its position.
 pub(super) fn position_torque(torque: &PositionTorque) -> CheckFinding {
     let what =
         format!("joint `{}` may have a spring, counterbalance or cable that the study does not state", torque.name);
@@ -335,7 +336,7 @@ pub(super) fn position_torque(torque: &PositionTorque) -> CheckFinding {
     CheckFinding { level: Level::Warning, write: write.to_vec(), ..finding("position-torque", what, torque.words()) }
 }
 
-/// Keys of a payload at `link`, with mass and centre of mass if they have to be stated.
+/// Keys of a payload at `link`, with mass and centre of mass if the study must contain them.
 fn payload_section(link: &str, known: Option<(f64, [f64; 3])>) -> Vec<StudyChange> {
     let mut lines = vec!["name = \"tool\"".to_owned(), format!("link = {link:?}")];
     if let Some((mass_kg, [x, y, z])) = known {
@@ -349,7 +350,7 @@ fn carries_tool(log: usize) -> StudyChange {
     StudyChange { table: format!("[[log]] number {}", log + 1), line: "payload = \"tool\"".to_owned() }
 }
 
-/// A load that one of several training logs carries.
+/// Finding about a payload that is present in only one of several training logs.
 pub(super) fn log_load(study: &Study, robot: &StudyRobot, load: &LogLoad) -> CheckFinding {
     let (log, link) = (study.log_name(load.log), robot.model().bodies()[load.body].name());
     let [x, y, z] = load.com_m;

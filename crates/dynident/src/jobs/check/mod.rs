@@ -24,16 +24,18 @@ use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, log_load, position_torque, study_check};
 use std::path::Path;
 
-/// Audit checks for physically inconsistent bodies, independent of the robot's size.
+/// Names of the audit checks for physically inconsistent bodies; these do not depend on the robot's size.
 const INCONSISTENT_BODY_CHECKS: [&str; 4] =
     ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
 /// Code of the finding about a recorder that repeats rows.
 pub(super) const REPEATED_VALUES: &str = "import-repeated-values";
-/// Largest inertia about the centre of mass of a point mass, relative to mass times squared arm length.
+/// A body is treated as a point mass if its inertia about the centre of mass is at most this, relative to mass times
+/// squared arm length.
 const MAX_POINT_INERTIA_RATIO: f64 = 1e-12;
 
-/// Examines a study against its robot and its logs: channels, clock and samples of every log, and the hypothesis about
-/// the training logs that a consistent robot explains best. Writes no files.
+/// Examines a study against its robot and its logs: channels, clock and samples of every log. Also finds the
+/// hypothesis about mistakes in the study with which a physically consistent robot explains the training logs best.
+/// Writes no files.
 ///
 /// # Errors
 /// Every variant of [`Error`] for files, study and logs. Mistakes that are found are not errors.
@@ -41,7 +43,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     check_with(study, study_path, options, &CheckSettings::default())
 }
 
-/// As [`check()`], with other thresholds.
+/// Like [`check()`], with other thresholds.
 ///
 /// # Errors
 /// As [`check()`], and invalid thresholds.
@@ -80,7 +82,7 @@ pub fn check_with(
         let log = study.log_name(*index);
         check.findings.extend(event_findings(search, &log).iter().map(|finding| log_finding(&log, finding)));
     }
-    // A dead channel distorts the test of the robot description and of every torque that needs it.
+    // A dead channel distorts the test of the robot description, and every test that needs its torque.
     if check.findings.iter().any(|finding| finding.kind == "log" && finding.level == Level::Problem) {
         check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
@@ -91,7 +93,7 @@ pub fn check_with(
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })
 }
 
-/// As [`check_with`], for logs with commands in place of torques: no hypothesis about torques is compared.
+/// Like [`check_with`], for logs with commands instead of torques: no hypotheses about torques are compared.
 fn check_commanded(
     study: &StudyFile<'_>,
     robot: &StudyRobot,
@@ -137,7 +139,7 @@ fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Opti
 }
 
 /// One warning for all physically inconsistent bodies of the robot description. Base parameters are not affected, but
-/// unidentifiable bodies keep the values of the robot description.
+/// parameters that are not identifiable keep the values of the robot description.
 fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     let model = &robot.robot.model;
     let of_audit = audit(model)
@@ -174,7 +176,7 @@ fn is_a_point(body: &InertialParameters, arm_m: f64) -> bool {
     body.mass_kg() > 0.0 && body.inertia_at_com().is_some_and(|inertia| trace(inertia) <= most)
 }
 
-/// Findings of a diagnosis and of the stated torque units.
+/// Findings of a diagnosis, and about the torque units in the study.
 pub(super) fn diagnosis_check(
     study: &Study,
     robot: &StudyRobot,
@@ -195,7 +197,7 @@ pub(super) fn diagnosis_check(
     check
 }
 
-/// Currents without a scale, with the scale that the masses of the robot description give.
+/// Finding about currents without a scale, with the scale that follows from the masses of the robot description.
 fn with_estimate(currents: &CheckFinding, estimated: CheckFinding) -> CheckFinding {
     let evidence =
         format!("{}; estimated with the masses of the robot description: {}", currents.evidence, estimated.evidence);

@@ -6,25 +6,26 @@ use dynident_recording::CommandCheckSettings;
 /// Thresholds of the findings of [`check_with`](crate::check_with).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckSettings {
-    /// Largest unexplained share of all torque, 0 to 1, with which a mistake is reported. Default 0.3; most real data
+    /// Largest unexplained share of all torque, 0 to 1, at which a mistake is reported. Default 0.3; most real data
     /// sets have 0.1.
     pub max_unexplained_share: f64,
-    /// For noisy logs: a mistake is also reported if its unexplained share is at most this multiple of that of the
-    /// study as written. Default 0.75.
+    /// For noisy logs: a mistake is also reported if its unexplained share is at most this multiple of the
+    /// unexplained share of the study as written. Default 0.75.
     pub max_unexplained_ratio: f64,
-    /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
-    /// a noisy log of a slow pendulum has 0.81.
+    /// Unexplained share of all torque above which torque and motion are treated as unrelated. Default 0.92: a
+    /// correct study with a noisy log of a slow pendulum has 0.81.
     pub min_unrelated_share: f64,
-    /// Share of all torque that neither the best hypothesis nor noise explains, above which `check` warns. Default 0.6,
-    /// the limit of `identify`. It is no PROBLEM: a correct study with a noisy log of a slow pendulum has 0.80.
+    /// Share of all torque that neither the best hypothesis nor noise explains, above which `check` warns. Default
+    /// 0.6, like the limit of `identify`. The finding is a warning and not a PROBLEM, because a correct study with a
+    /// noisy log of a slow pendulum has 0.80.
     pub max_unexplained_beyond_noise: f64,
-    /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
-    /// gear ratios of one arm differ by at most 5.
+    /// Largest ratio between the torque factors of joints that a common unit or motor currents can explain. Default
+    /// 10: motor constants times gear ratios of one arm differ by a factor of at most 5.
     pub max_factor_ratio: f64,
-    /// Equations per parameter below which the logs are too short. Default 2.
+    /// Number of equations per parameter below which the logs are too short. Default 2.
     pub too_few_equations: usize,
-    /// Equations per parameter below which the logs are short, a warning. Default 3: ten seconds of slow motion have
-    /// 2.7, and about half of the fits to such logs are usable.
+    /// Number of equations per parameter below which `check` warns of short logs. Default 3: ten seconds of slow
+    /// motion have 2.7, and about half of the fits to such logs are usable.
     pub few_equations: usize,
     /// Thresholds of the findings about commanded positions.
     pub commands: CommandCheckSettings,

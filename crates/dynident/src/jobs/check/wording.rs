@@ -7,7 +7,8 @@ use core::fmt::Write;
 use dynident_identification::diagnosis::{Hypothesis, Mistake, StudyKeys};
 use dynident_recording::Level;
 
-/// Smallest evidence: natural logarithm of the ratio of a joint's unexplained torque before and after the correction.
+/// Smallest improvement that is mentioned as evidence: natural logarithm of the ratio of a joint's unexplained torque
+/// before and after the correction.
 const MIN_LOG_RATIO: f64 = 0.2;
 
 #[derive(Clone, Copy)]
@@ -36,7 +37,7 @@ pub(super) fn alternative(mistake: &Mistake, joints: &[String], keys: Option<&St
     if write.is_empty() { sentence } else { format!("{sentence} ({})", write.join(", ")) }
 }
 
-/// Evidence for a mistake: the joint with the largest improvement, and limits that hold only with the correction.
+/// Evidence for a mistake: the joint with the largest improvement, and limits that are kept only with the correction.
 pub(super) fn evidence(mistake: &Mistake, before: &Hypothesis, after: &Hypothesis, joints: &[String]) -> String {
     let gain_of = |of: fn(&Hypothesis) -> &[f64], joint: usize| {
         let share = |hypothesis| of(hypothesis).get(joint).map_or(1.0, |share: &f64| share.max(1e-6));
@@ -44,12 +45,12 @@ pub(super) fn evidence(mistake: &Mistake, before: &Hypothesis, after: &Hypothesi
     };
     let gain = |joint: &usize| gain_of(|hypothesis| &hypothesis.left, *joint);
     let named = mistake.joints(joints.len());
-    // A named joint has priority if its improvement is large enough.
+    // The joint that the mistake concerns is preferred if its improvement is large enough.
     let own =
         named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > MIN_LOG_RATIO);
     let most = (0..joints.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
     let joint = own.unwrap_or(most);
-    // If consistent bodies explain both equally well, the nominal bodies are the evidence.
+    // If consistent bodies explain both hypotheses equally well, the fit of the nominal bodies is the evidence.
     let by_bodies = |joint: &usize| gain_of(|hypothesis| &hypothesis.nominal, *joint);
     let of_bodies = (0..joints.len()).max_by(|a, b| by_bodies(a).total_cmp(&by_bodies(b)));
     let are_described = before.nominal.len() == joints.len() && after.nominal.len() == joints.len();

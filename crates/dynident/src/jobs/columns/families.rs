@@ -1,4 +1,4 @@
-//! Columns of one quantity, one per joint.
+//! Groups (families) of columns with one quantity, one column per joint.
 
 use super::meaning::{JointKey, Meaning, Source, is_quantity, meaning, of_file};
 use super::quantity::Quantity;
@@ -6,14 +6,14 @@ use super::units::with_unit;
 use crate::result::LogContents;
 use std::path::Path;
 
-/// Source of the quantity of columns.
+/// How the quantity of a family of columns was determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum Basis {
     ColumnNames,
     FileName,
-    /// The order of columns without names.
+    /// By the order of columns without names.
     Order,
-    /// Nothing but the number of columns.
+    /// Assumed, from the number of columns alone.
     Assumption,
 }
 
@@ -21,7 +21,7 @@ pub(in crate::jobs) enum Basis {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Family {
     pub(in crate::jobs) file: usize,
-    /// Index of the group (topic) within it.
+    /// Index of the group (topic) within the file.
     pub(in crate::jobs) group: usize,
     pub(in crate::jobs) quantity: Quantity,
     pub(in crate::jobs) source: Source,
@@ -30,16 +30,18 @@ pub(in crate::jobs) struct Family {
     /// Columns with another unit.
     pub(in crate::jobs) other_units: Vec<(String, Option<&'static str>)>,
     pub(in crate::jobs) basis: Basis,
-    /// The names without their joints.
+    /// The names of the columns without their joints.
     pub(in crate::jobs) stem: String,
-    /// Whether the columns are the entries of a message's array without names: the message gives their order.
+    /// Whether the columns are the entries of an array without names in a message, so that the message defines their
+    /// order.
     pub(in crate::jobs) in_message_order: bool,
-    /// Joint and name of each column: in the order of the robot's joints, of the numbers, or of the file.
+    /// Joint and name of each column: in the order of the robot's joints, of the numbers in the names, or of the
+    /// file.
     pub(in crate::jobs) columns: Vec<(JointKey, String)>,
 }
 
 impl Family {
-    /// A family of one column.
+    /// Creates a family with a single column.
     fn of_column(
         file: usize,
         group: usize,
@@ -60,21 +62,21 @@ impl Family {
         }
     }
 
-    /// The unit in the name of one of its columns.
+    /// The unit in the name of the column `column` of the family.
     pub(in crate::jobs) fn unit_of(&self, column: &str) -> Option<&'static str> {
         self.other_units.iter().find(|(name, _)| name == column).map_or(self.unit, |(_, unit)| *unit)
     }
 
-    /// Rank among families of one quantity: the source, known joints, the number of joints.
+    /// Rank among families of one quantity: by source, known joints, and number of joints.
     fn rank(&self) -> (Source, bool, usize, bool, Source) {
         let key = &self.columns[0].0;
-        // Names of entries of an array are names of joints; other words may be axes of a tool.
+        // Names of array entries are names of joints; other words can be axes of a tool.
         let is_known = !matches!(key, JointKey::Name(_) | JointKey::Alone) || self.columns[0].1.ends_with(']');
         let is_named = matches!(key, JointKey::Joint(_));
         (self.source.min(Source::Unstated), is_known, self.columns.len(), is_named, self.source)
     }
 
-    /// Number of words, apart from quantities, that only one of both names has: `arm1_pos` belongs to `arm1_torque`.
+    /// Number of words (except quantities) that only one of both names has: `arm1_pos` belongs to `arm1_torque`.
     fn distance(&self, other: Option<&Self>) -> usize {
         let words =
             |family: &Self| family.stem.split('_').map(str::to_owned).filter(|word| !is_quantity(word)).collect();
@@ -93,12 +95,12 @@ pub(in crate::jobs) fn families<'a>(
     for (file, (path, contents)) in logs.into_iter().enumerate() {
         let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let (of_file, source_of_file) = of_file(&stem);
-        // A file without names that has a column for each joint.
+        // The file has no column names, and a column for each joint.
         let is_nameless = is_nameless(contents) && contents.channels.len() <= joints.len();
         for channel in contents.channels.iter().filter(|channel| channel.samples > 0) {
             let Meaning { quantity, joint, source, unit, stem, .. } =
                 meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
-            // The file name gives the quantity of columns that are named by joints alone.
+            // If column names consist of joint names only, the file name gives the quantity.
             let is_joint = matches!(joint, JointKey::Joint(_)) || is_nameless;
             let bare = quantity.is_none() && is_joint && stem.is_empty();
             let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };
@@ -114,7 +116,7 @@ pub(in crate::jobs) fn families<'a>(
     found
 }
 
-/// Adds `column`, a family of one column, to its family in `found`.
+/// Adds `column`, a family with a single column, to the matching family in `found`.
 fn add(found: &mut Vec<Family>, column: Family) {
     let same = |family: &&mut Family| {
         (family.file, family.group, family.quantity, &family.stem)
@@ -122,7 +124,7 @@ fn add(found: &mut Vec<Family>, column: Family) {
             && core::mem::discriminant(&family.columns[0].0) == core::mem::discriminant(&column.columns[0].0)
     };
     match found.iter_mut().find(same) {
-        // Of several columns for one joint, the first is used.
+        // If there are several columns for one joint, the first is used.
         Some(family) if family.columns.iter().any(|(key, _)| *key == column.columns[0].0) => {}
         Some(family) => {
             if family.unit != column.unit {
@@ -134,7 +136,8 @@ fn add(found: &mut Vec<Family>, column: Family) {
     }
 }
 
-/// Sorts columns in the order of the robot's joints, or by number; other names keep the order of the file.
+/// Sorts columns in the order of the robot's joints, or by number; columns with other names keep the order of the
+/// file.
 fn in_order_of_joints(found: &mut [Family]) {
     for family in found {
         family.columns.sort_by_key(|(key, _)| match key {
@@ -145,8 +148,8 @@ fn in_order_of_joints(found: &mut [Family]) {
     }
 }
 
-/// Groups of columns, one for each of several joints, whose names state no quantity: `A1` to `A7`. They become
-/// families of `quantity` by assumption.
+/// Groups of columns, one column for each of several joints, whose names contain no quantity: `A1` to `A7`. They
+/// become families of `quantity` by assumption.
 pub(in crate::jobs) fn families_without_quantity<'a>(
     logs: impl IntoIterator<Item = (&'a Path, &'a LogContents)>,
     joints: &[String],
@@ -183,8 +186,8 @@ fn is_array_entry(name: &str) -> bool {
     inside.is_some_and(|(_, inside)| inside.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
-/// The families of columns without names in `contents`: one for each of `quantities`, each with `count` columns, in the
-/// order of the file. The time column is left out. Empty if the number of columns is another.
+/// The families of columns without names in `contents`: one for each of `quantities`, each with `count` columns, in
+/// the order of the file. The time column is not included. Empty if the file has a different number of columns.
 pub(in crate::jobs) fn families_by_order(file: usize, contents: &LogContents, counts: &[usize]) -> Vec<Family> {
     use Quantity::{Acceleration, Position, Torque, Velocity};
     let time = contents.groups.first().and_then(|group| group.time.as_ref());
@@ -211,8 +214,9 @@ pub(in crate::jobs) fn families_by_order(file: usize, contents: &LogContents, co
     order.iter().zip(columns.chunks(count)).map(family).collect()
 }
 
-/// The best family with this quantity: measured before filtered, commanded and computed, then columns with the names of
-/// joints or with numbers, then the largest number of joints; the first of equals.
+/// The best family with this quantity. Measured families are preferred to filtered, commanded and computed ones; then
+/// families with names of joints or with numbers, then the largest number of joints. Among equal families the first
+/// is used.
 pub(in crate::jobs) fn best(
     families: &[Family],
     quantity: Quantity,
@@ -221,7 +225,7 @@ pub(in crate::jobs) fn best(
     best_next_to(families, quantity, None, fits)
 }
 
-/// As [`best`]; of equals, the one whose name is most similar to that of `other`.
+/// Like [`best`]; among equal families, the one whose name is most similar to that of `other`.
 pub(in crate::jobs) fn best_next_to<'a>(
     families: &'a [Family],
     quantity: Quantity,
@@ -232,7 +236,7 @@ pub(in crate::jobs) fn best_next_to<'a>(
     of_quantity.rev().max_by_key(|family| (family.rank(), core::cmp::Reverse(family.distance(other))))
 }
 
-/// Another family in the file of `chosen` that nothing but its place in the file distinguishes from it.
+/// Another family in the file of `chosen` that differs from it only in its position in the file.
 pub(in crate::jobs) fn equal_choice<'a>(
     families: &'a [Family],
     chosen: &Family,
@@ -247,13 +251,13 @@ pub(in crate::jobs) fn equal_choice<'a>(
     })
 }
 
-/// The best commanded positions, for a robot whose torque is not in the log.
+/// The best family of commanded positions, for a robot whose log has no torque.
 pub(in crate::jobs) fn best_command(families: &[Family], fits: impl Fn(&Family) -> bool) -> Option<&Family> {
     best(families, Quantity::Position, |family| family.source == Source::Commanded && fits(family))
 }
 
-/// Whether the columns of several joints contain no negative value: the size of a current or load without its sign,
-/// which is no torque.
+/// Whether the columns of several joints contain no negative value. They are then the magnitude of a current or
+/// torque without its sign, which is not usable as torque.
 pub(in crate::jobs) fn is_unsigned(family: &Family, contents: &LogContents) -> bool {
     let range = |name: &String| contents.channels.iter().find(|channel| channel.name == *name)?.range;
     family.columns.len() > 1
@@ -261,8 +265,8 @@ pub(in crate::jobs) fn is_unsigned(family: &Family, contents: &LogContents) -> b
         && family.columns.iter().any(|(_, name)| range(name).is_some_and(|[_, high]| high > 0.0))
 }
 
-/// The best torques for these positions: measured torques, measured currents, commanded torques, commanded currents,
-/// then computed ones.
+/// The best torques for these positions, in this order of preference: measured torques, measured currents, commanded
+/// torques, commanded currents, computed torques.
 pub(in crate::jobs) fn best_torque<'a>(
     families: &'a [Family],
     position: Option<&Family>,

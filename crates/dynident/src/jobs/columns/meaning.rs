@@ -12,7 +12,7 @@ pub(in crate::jobs) enum JointKey {
     Name(String),
     /// A number in the name: `q3`, `tau[0]`.
     Number(u64),
-    /// No joint: the only column of its kind.
+    /// No joint in the name: the only column of its kind.
     Alone,
 }
 
@@ -25,14 +25,14 @@ pub(in crate::jobs) enum Source {
     Commanded,
     /// A filtered copy of a recorded value, according to the name.
     Filtered,
-    /// Not stated in the name.
+    /// The name contains no source.
     Unstated,
     /// A measured value, according to the name.
     Measured,
 }
 
 impl Source {
-    /// Whether the quantity comes from the robot: measured, or not stated in the name.
+    /// Whether the quantity was recorded from the robot: measured, or without a source in the name.
     pub(in crate::jobs) fn is_recorded(self) -> bool {
         self > Self::Commanded
     }
@@ -40,15 +40,15 @@ impl Source {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::jobs) struct Meaning {
-    /// `None` if only the name of the file could give it.
+    /// Quantity; `None` if only the name of the file could give it.
     pub(in crate::jobs) quantity: Option<Quantity>,
     pub(in crate::jobs) joint: JointKey,
     pub(in crate::jobs) source: Source,
-    /// In the notation of a study.
+    /// Unit, in the notation of a study.
     pub(in crate::jobs) unit: Option<&'static str>,
-    /// Whether it is a part or an error of a quantity, a limit or a status.
+    /// Whether the column contains a part or an error of a quantity, a limit or a status.
     pub(in crate::jobs) is_part: bool,
-    /// The name without its joint, equal for the columns of all joints.
+    /// The name without its joint; it is equal for the columns of all joints.
     pub(in crate::jobs) stem: String,
 }
 
@@ -114,10 +114,10 @@ const COMMANDED: [&str; 25] = [
     "interp",
     "d",
 ];
-/// Names without a quantity that are positions: a command alone, and the words of a LeRobot data set.
+/// Names that contain no quantity but mean commanded positions: a command alone, and the words of a LeRobot data set.
 const COMMANDED_POSITIONS: [&str; 9] =
     ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action"];
-/// Beginning of the columns of the commands in a SAGE recording.
+/// Beginning of the names of command columns in a SAGE recording.
 const SAGE_COMMANDS: &str = "control.";
 const MEASURED: [&str; 18] = [
     "actual", "act", "measured", "meas", "msr", "sensor", "sensed", "ist", "fb", "fbk", "feedback", "executed", "real",
@@ -146,7 +146,8 @@ const COMPUTED: [&str; 20] = [
     "expected",
     "reconstructed",
 ];
-/// Quantities that are not the total position or torque of a joint: errors, parts of a torque, and others.
+/// Words for quantities that are not the complete position or torque of a joint: errors, parts of a torque, and
+/// others.
 const OTHERS: [&str; 29] = [
     "ext",
     "external",
@@ -178,12 +179,12 @@ const OTHERS: [&str; 29] = [
     "mode",
     "constant",
 ];
-/// Suffixes of the parts of a torque, `tau_g`; letters that may be joints or axes in other names.
+/// Suffixes for parts of a torque, as in `tau_g`; in other names these letters can be joints or axes.
 const PARTS_OF_TORQUE: [&str; 1] = ["g"];
 
 /// Interprets `name` for a robot with these joints.
 pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
-    // As written, `jointGripper.pos`, or split at capital letters, `elbowPosition`.
+    // The name as written, `jointGripper.pos`, or split at capital letters, `elbowPosition`.
     #[allow(clippy::single_match_else, reason = "both cases have the same form")]
     let (rest, joint) = match without_joint(name, joints) {
         (rest, Some(joint)) => (split_camel_case(&rest).to_lowercase(), Some(joint)),
@@ -193,7 +194,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
             (rest.to_lowercase(), joint)
         }
     };
-    // Only units of joint quantities: the suffix of a motor torque `tau_m` is not metres.
+    // Only units of joint quantities are recognised: the suffix of a motor torque `tau_m` does not mean metres.
     let is_length = |before: &str, unit: &str| {
         let is_position = |word: &String| !is_quantity(word) || POSITIONS.contains(&word.as_str());
         (unit == "mm" || unit == "m" && joint.is_some()) && words(before).iter().all(is_position)
@@ -209,7 +210,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     };
     let (rest, named) = if joint.is_none() { without_brackets(&rest) } else { (rest, None) };
     let (rest, named) = match named.as_deref().and_then(|named| named.rsplit_once('.')) {
-        // `action[elbow.pos]`, `observation.state[joint_1.torque]`: the quantity is a part of the entry's name.
+        // In `action[elbow.pos]` and `observation.state[joint_1.torque]` the quantity is a part of the entry's name.
         Some((own, quantity)) if is_quantity(quantity) => (format!("{rest} {quantity}"), Some(own.to_owned())),
         _ => (rest, named),
     };
@@ -220,7 +221,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     };
     let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
     let by_words = [
-        // The longest derivative first, because `ddq` contains `q`.
+        // The longest derivative comes first, because `ddq` contains `q`.
         (&ACCELERATIONS[..], Quantity::Acceleration),
         (&VELOCITIES[..], Quantity::Velocity),
         (&CURRENTS[..], Quantity::Current),
@@ -228,7 +229,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         (&POSITIONS[..], Quantity::Position),
     ];
     let place = |list: &[&str]| words.iter().position(|word| list.contains(&word.as_str()));
-    // A current position, velocity or torque is the present one.
+    // The word "current" before a position, velocity or torque means "present".
     let is_present = place(&["current"]).is_some_and(|at| {
         [&VELOCITIES[..], &TORQUES, &POSITIONS].into_iter().any(|list| place(list).is_some_and(|word| word > at))
     });
@@ -244,11 +245,11 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
         _ => None,
     };
     let by_word = by_word.or_else(|| of_entries.filter(|_| is_entry && unit.is_none()));
-    // A torque in amperes is a current; any other unit is used only if the words give no quantity.
+    // A torque in amperes is a current. Any other unit is used only if the words contain no quantity.
     let of_unit = unit.and_then(|(_, quantity)| quantity);
     let quantity = match (by_word, of_unit) {
         (Some(Quantity::Torque), Some(Quantity::Current)) => Some(Quantity::Current),
-        // A suffix of one letter is not sufficient for a current.
+        // A suffix of one letter is not sufficient evidence for a current.
         (None, Some(Quantity::Current)) if unit.is_some_and(|(unit, _)| unit == "A") => None,
         (by_word, of_unit) => by_word.or(of_unit),
     };
@@ -281,7 +282,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     }
 }
 
-/// Splits a word of a quantity and its source: `qdes`, `taufb`, `sollposition`.
+/// Splits a word that combines a quantity and its source: `qdes`, `taufb`, `sollposition`.
 fn split_compound(word: String) -> Vec<String> {
     let is_source = |part: &str| part.len() > 1 && (COMMANDED.contains(&part) || MEASURED.contains(&part));
     if is_quantity(&word) || is_source(&word) {
@@ -299,7 +300,7 @@ pub(super) fn is_quantity(word: &str) -> bool {
     lists.iter().any(|list| list.contains(&word))
 }
 
-/// Places of the words that are neither a quantity nor a source, if they follow each other: `shoulder_pan` of
+/// Positions of the words that are neither a quantity nor a source, if they are consecutive: `shoulder_pan` in
 /// `shoulder_pan.pos`.
 fn other_words(words: &[String]) -> Range<usize> {
     let lists: [&[&str]; 9] =
@@ -311,7 +312,7 @@ fn other_words(words: &[String]) -> Range<usize> {
     }
 }
 
-/// Quantity and source from a file name, for columns that are named by joints alone.
+/// Quantity and source from a file name, for columns whose names consist of joint names only.
 pub(in crate::jobs) fn of_file(stem: &str) -> (Option<Quantity>, Source) {
     let found = meaning(stem, &[]);
     (found.quantity, found.source)
@@ -322,7 +323,7 @@ fn split_camel_case(name: &str) -> String {
     let mut text = String::with_capacity(name.len() + 4);
     let (mut earlier, mut before) = (' ', ' ');
     for c in name.chars() {
-        // Not in the units `mNm` and `kNm`.
+        // The units `mNm` and `kNm` are not split.
         let is_prefix = c == 'N' && ['m', 'k'].contains(&before) && !earlier.is_alphabetic();
         if before.is_lowercase() && c.is_uppercase() && !is_prefix {
             text.push('_');
@@ -333,9 +334,10 @@ fn split_camel_case(name: &str) -> String {
     text
 }
 
-/// Removes the longest joint name that is a separate word, in either case; returns the rest and the joint's index.
+/// Removes the longest joint name that is a separate word, in upper or lower case; returns the rest and the joint's
+/// index.
 fn without_joint(name: &str, joints: &[String]) -> (String, Option<usize>) {
-    // Only ASCII letters change, so that places in both texts are equal.
+    // Only ASCII letters change, so that positions in both texts are equal.
     let lower = name.to_ascii_lowercase();
     let mut found: Option<(usize, usize, usize)> = None;
     for (place, joint) in joints.iter().enumerate() {

@@ -3,8 +3,8 @@
 use super::meaning::JointKey;
 use dynident_text::quoted;
 
-/// Splits a name into a common pattern and its own part: `q12_rad` into `q{}_rad` and `12`, `tau[elbow]` into `tau[]`
-/// and `elbow`.
+/// Splits a name into a pattern that several names share and its own part: `q12_rad` into `q{}_rad` and `12`,
+/// `tau[elbow]` into `tau[]` and `elbow`.
 fn split_pattern(name: &str) -> (String, String) {
     if let Some((open, close)) = name.rfind('[').zip(name.rfind(']')).filter(|(open, close)| open < close) {
         return (format!("{}[{}", &name[..open], &name[close..]), name[open + 1..close].to_owned());
@@ -30,7 +30,7 @@ fn columns(members: &[(String, String)]) -> String {
             return quoted(&format!("{before}{{{}..{}}}{after}", first.0, last.0));
         }
     }
-    // A bare number would be a column index, so names are quoted.
+    // A bare number would be read as a column index, so names are quoted.
     let names: Vec<String> = members.iter().map(|(_, name)| quoted(name)).collect();
     format!("[{}]", names.join(", "))
 }
@@ -45,7 +45,8 @@ pub(in crate::jobs) fn column_list(names: &[String]) -> String {
     format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
 }
 
-/// One pattern for columns that differ only by the names of their joints, `effort[{joint}]`; `None` for others.
+/// One pattern for columns that differ only in the names of their joints, such as `effort[{joint}]`; `None` for
+/// others.
 pub(in crate::jobs) fn joint_pattern(columns: &[(JointKey, String)]) -> Option<String> {
     let pattern = |(key, name): &(JointKey, String)| {
         let JointKey::Name(joint) = key else { return None };
@@ -56,7 +57,7 @@ pub(in crate::jobs) fn joint_pattern(columns: &[(JointKey, String)]) -> Option<S
     columns.iter().all(|column| pattern(column).as_ref() == Some(&first)).then_some(first)
 }
 
-/// Names of columns in a message: runs of numbers as one pattern, at most `most` entries.
+/// Names of columns for a message: consecutive numbers become one pattern; at most `most` entries.
 pub(in crate::jobs) fn shown(names: &[String], most: usize) -> String {
     let mut parts: Vec<(String, Vec<String>)> = Vec::new();
     for name in names {
@@ -72,7 +73,7 @@ pub(in crate::jobs) fn shown(names: &[String], most: usize) -> String {
             [own] => own.clone(),
             [] => String::new(),
         };
-        // A pattern has empty brackets in place of the part that varies.
+        // A pattern has empty brackets instead of the part that varies.
         if pattern.contains("{}") {
             pattern.replacen("{}", &own, 1)
         } else {

@@ -3,7 +3,7 @@
 use super::quantity::Quantity;
 use std::borrow::Cow;
 
-/// Ending, unit in study notation, and joint quantity with this unit; longest ending first.
+/// Ending, unit in the notation of a study, and joint quantity with this unit; longest ending first.
 const ENDINGS: [(&str, &str, Option<Quantity>); 56] = [
     ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
     ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
@@ -53,7 +53,7 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 56] = [
     ("ma", "mA", Some(Quantity::Current)),
     ("amps", "A", Some(Quantity::Current)),
     ("a", "A", Some(Quantity::Current)),
-    // Units that are not of a joint quantity.
+    // Units that do not belong to a joint quantity.
     ("degc", "degC", None),
     ("mm", "mm", None),
     ("ms", "ms", None),
@@ -64,8 +64,8 @@ const ENDINGS: [(&str, &str, Option<Quantity>); 56] = [
     ("s", "s", None),
 ];
 
-/// The unit `unit`, of `of_unit` according to the name, for a column of `quantity`: a velocity in `deg` is in deg/s.
-/// `None` if it is no unit of this quantity.
+/// The unit for a column of `quantity`, if its name contains `unit`, which usually belongs to the quantity `of_unit`:
+/// a velocity in `deg` is in deg/s. `None` if the unit is not possible for this quantity.
 pub(super) fn unit_for(unit: &'static str, of_unit: Option<Quantity>, quantity: Quantity) -> Option<&'static str> {
     if of_unit == Some(quantity) {
         return Some(unit);
@@ -90,7 +90,7 @@ const FIELDS: [(&str, &str); 8] = [
     (".stamp", "s"),
 ];
 
-/// Unit from a name: `q1_rad`, `tau_Nm[3]`, `/joint_states.effort[elbow]`.
+/// Unit in a name: `q1_rad`, `tau_Nm[3]`, `/joint_states.effort[elbow]`.
 pub(in crate::jobs) fn unit(name: &str) -> Option<&'static str> {
     let lower = name.to_lowercase();
     // Only ROS topics begin with a slash.
@@ -109,7 +109,7 @@ pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantit
         // `N·m`, `kgf.cm`.
         && let plain = inside.replace(['·', '⋅', '*', '.'], " ")
         && let Some((_, unit, quantity)) = ENDINGS.iter().find(|(ending, ..)| *ending == inside || *ending == plain)
-        // `effort[a]` is the effort of a joint a.
+        // `effort[a]` is the effort of a joint called a, not an effort in A.
         && (inside.len() > 1 || before.ends_with(' ') || !lower.ends_with(']'))
     {
         return Some((before.trim_end().to_owned(), unit, *quantity));
@@ -124,7 +124,7 @@ pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantit
     found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
 }
 
-/// The parts of `time [ms]`, `time (ms)` or `time {ms}` before and in the brackets at its end.
+/// Splits `time [ms]`, `time (ms)` or `time {ms}` into the part before the brackets and the part in the brackets.
 fn in_brackets(name: &str) -> Option<(&str, &str)> {
     let pairs = [('[', ']'), ('(', ')'), ('{', '}')];
     let of = |(open, close): (char, char)| name.trim_end().strip_suffix(close)?.rsplit_once(open);
@@ -160,7 +160,8 @@ pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     }
 }
 
-/// The name with the unit that the file states separately: `q1 [deg]`. A name that contains a unit is not changed.
+/// The name with the unit that the file contains separately: `q1 [deg]`. A name that already contains a unit is not
+/// changed.
 pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow<'a, str> {
     match stated {
         Some(stated) if unit(name).is_none() => {
@@ -171,9 +172,9 @@ pub(in crate::jobs) fn with_unit<'a>(name: &'a str, stated: Option<&str>) -> Cow
     }
 }
 
-/// The time column as the value of a study's `time`; `unit` is that of its channel.
+/// The time column as a value for a study's `time`; `unit` is the unit of its channel.
 pub(in crate::jobs) fn time_as_toml(name: &str, unit: Option<&str>) -> String {
-    // A column that was found by its values has no unit in its name.
+    // The name of a column that was found by its values contains no unit.
     let stated = unit
         .filter(|unit| time_unit_s(name).is_none() || *unit == "d")
         .map(|unit| unit.trim_matches(['[', ']', '(', ')']));

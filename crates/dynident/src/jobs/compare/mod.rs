@@ -1,17 +1,16 @@
 //! `compare`: results side by side, and what changed between them.
 
 use crate::error::Error;
-use crate::jobs::differences::{MIN_LISTED_PROBABILITY, changed_body, explanations_of};
+use crate::jobs::differences::explanations_of;
 use crate::result::{
-    BaseParameterResult, COMPARISON_SCHEMA, ChangeExplanation, ChangedPart, ChangesFrom, ComparedBody,
-    ComparedFriction, ComparedParameter, ComparedResult, ComparisonFile, ResultFile,
+    BaseParameterResult, COMPARISON_SCHEMA, ChangesFrom, ComparedBody, ComparedFriction, ComparedParameter,
+    ComparedResult, ComparisonFile, ResultFile,
 };
-use dynident_dynamics::{BaseParameterSettings, BaseParameters, ParametricModel};
+use dynident_dynamics::{ParametricModel, ParametricModelError};
 use dynident_estimation::HALF_WIDTH_95;
-use dynident_estimation::changes::{ChangeSettings, Explanation, explanations};
 use dynident_estimation::uncertainty::chi_squared_tail;
 use dynident_export::RobotModel;
-use dynident_identification::changes::{DescriptionDifferences, Part, Parts, parts};
+use dynident_identification::changes::Differences;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::{DescriptionThresholds, Role};
 use dynident_model::terms::TorqueTerm;
@@ -201,14 +200,20 @@ fn estimate(result: &ResultFile, path: &Path, names: &[&str]) -> Result<(DVector
     Ok((values, DMatrix::from_fn(places.len(), places.len(), |a, b| rows[places[a]][places[b]])))
 }
 
-/// Names of parameters that the robot's structure also has, with their indices there.
-fn known_rows<'a>(robot: &RobotModel, names: &[&'a str]) -> (Vec<&'a str>, Vec<usize>, BaseParameters) {
+/// The robot of a result with these nominal values of its bodies and none of its terms, and the parameters that it also
+/// has: their names and their indices among its base parameters.
+fn known_rows<'a>(
+    robot: &RobotModel,
+    bodies: Vec<f64>,
+    names: &[&'a str],
+) -> Result<(ParametricModel, Vec<&'a str>, Vec<usize>), ParametricModelError> {
     let terms: Vec<TorqueTerm> = robot.terms().map(|(term, _)| term.clone()).collect();
-    let base = BaseParameters::new(robot.model(), &terms, &BaseParameterSettings::default());
-    let symbols = base.expressions();
+    let nominal = bodies.into_iter().chain(vec![0.0; terms.len()]).collect();
+    let model = ParametricModel::new(robot.model().clone(), terms)?.with_nominal(nominal)?;
+    let symbols = model.base().expressions();
     let found = names.iter().filter_map(|name| Some((*name, symbols.iter().position(|own| own == name)?)));
     let (names, rows) = found.unzip();
-    (names, rows, base)
+    Ok((model, names, rows))
 }
 
 fn between(
@@ -217,92 +222,46 @@ fn between(
     common: &[&str],
 ) -> Result<ChangesFrom, Error> {
     let robot = stored_robot(first, first_path)?;
-    let (names, rows, base) = known_rows(&robot, common);
+    let failed = |reason: String| wrong(path, reason);
+    let bodies = robot.model().inertials().iter().flat_map(|body| body.0).collect();
+    let (model, names, rows) = known_rows(&robot, bodies, common).map_err(|error| failed(error.to_string()))?;
     let (old, old_covariance) = estimate(first, first_path, &names)?;
     let (new, new_covariance) = estimate(result, path, &names)?;
-    let value = |result: &ResultFile, term: &TorqueTerm| {
-        let own = result.base_parameters.iter().find(|own| own.symbol == term.symbol());
-        own.map_or(0.0, |own| own.value.abs() + own.std)
-    };
-    let size = |term: &TorqueTerm| value(first, term).max(value(result, term));
-    let parts = parts(robot.model(), &base, &rows, &size);
-    let covariance = old_covariance + new_covariance;
-    changes_of((new - old, covariance), &robot, &parts, (index, Some(0)), path)
+    let found = Differences::between(&model, &rows, [(&old, &old_covariance), (&new, &new_covariance)]);
+    let found = found.map_err(|error| failed(error.to_string()))?;
+    Ok(changes_of(&found, &model, (index, Some(0)), rows.len()))
 }
 
 /// Changes of a result from its robot description; `None` if the description has no inertial values.
 fn from_description(result: &ResultFile, path: &Path, common: &[&str]) -> Result<Option<ChangesFrom>, Error> {
     let robot = stored_robot(result, path)?;
-    let described: Vec<&str> =
-        common.iter().copied().filter(|name| parameter(result, name).is_some_and(|own| own.prior.is_some())).collect();
-    let (names, rows, _) = known_rows(&robot, &described);
-    let priors: Option<Vec<[f64; 10]>> = result.bodies.iter().map(|body| body.prior).collect();
-    let Some(priors) = priors.filter(|_| !names.is_empty()) else { return Ok(None) };
+    let is_described = |name: &&&str| parameter(result, name).is_some_and(|own| own.prior.is_some());
+    let described: Vec<&str> = common.iter().filter(is_described).copied().collect();
     let failed = |reason: String| wrong(path, reason);
-    let terms: Vec<TorqueTerm> = robot.terms().map(|(term, _)| term.clone()).collect();
-    let nominal = priors.into_iter().flatten().chain(vec![0.0; terms.len()]).collect();
-    let model = ParametricModel::new(robot.model().clone(), terms).map_err(|error| failed(error.to_string()))?;
-    let model = model.with_nominal(nominal).map_err(|error| failed(error.to_string()))?;
+    let priors: Option<Vec<[f64; 10]>> = result.bodies.iter().map(|body| body.prior).collect();
+    let Some(priors) = priors.filter(|priors| !priors.is_empty() && !described.is_empty()) else { return Ok(None) };
+    let (model, names, rows) = known_rows(&robot, priors.into_iter().flatten().collect(), &described)
+        .map_err(|error| failed(error.to_string()))?;
     let (values, covariance) = estimate(result, path, &names)?;
     let knowledge = ConsistencySettings::default();
-    let found = DescriptionDifferences::new(&model, &rows, &values, &covariance, &knowledge);
-    let Some(found) = found.map_err(|error| failed(error.to_string()))? else { return Ok(None) };
-    let (chi_squared, count) = (found.chi_squared(), rows.len());
-    Ok(Some(ChangesFrom {
-        result: 0,
-        from: None,
-        chi_squared,
-        degrees_of_freedom: count,
-        p_value: chi_squared_tail(chi_squared, count as f64),
-        explanations: explanations_of(&found, model.model(), &DescriptionThresholds::default()),
-    }))
+    let found = Differences::from_description(&model, &rows, &values, &covariance, &knowledge);
+    let found = found.map_err(|error| failed(error.to_string()))?;
+    Ok(found.map(|found| changes_of(&found, &model, (0, None), rows.len())))
 }
 
 fn changes_of(
-    (difference, covariance): (DVector<f64>, DMatrix<f64>),
-    robot: &RobotModel,
-    parts: &Parts,
+    found: &Differences,
+    model: &ParametricModel,
     (result, from): (usize, Option<usize>),
-    path: &Path,
-) -> Result<ChangesFrom, Error> {
-    let failed = |source: dynident_estimation::EstimationError| wrong(path, source.to_string());
-    let found =
-        explanations(&difference, core::slice::from_ref(&covariance), &parts.groups, &ChangeSettings::default())
-            .map_err(failed)?;
-    let count = difference.len();
-    let none = found.iter().find(|own| own.groups.is_empty());
-    let chi_squared = none.map_or(0.0, |own| own.remaining * count as f64);
-    let likely = found.iter().filter(|own| own.probability >= MIN_LISTED_PROBABILITY);
-    Ok(ChangesFrom {
+    degrees_of_freedom: usize,
+) -> ChangesFrom {
+    let chi_squared = found.chi_squared();
+    ChangesFrom {
         result,
         from,
         chi_squared,
-        degrees_of_freedom: count,
-        p_value: chi_squared_tail(chi_squared, count as f64),
-        explanations: likely.map(|own| explained(own, robot, parts)).collect(),
-    })
-}
-
-fn explained(explanation: &Explanation, robot: &RobotModel, parts: &Parts) -> ChangeExplanation {
-    let everything = explanation.groups.len() == parts.parts.len() && parts.parts.len() > 2;
-    let changed = |(&group, change): (&usize, &(DVector<f64>, DMatrix<f64>))| {
-        let part = &parts.parts[group];
-        let words = part.words(robot.model());
-        match part {
-            Part::Body(_) => {
-                let (values, covariance) = change;
-                let sizes = &parts.sizes[group];
-                let std = covariance[(0, 0)].max(0.0).sqrt() * sizes[0];
-                changed_body(words, values.component_mul(sizes).as_slice(), std)
-            }
-            _ => ChangedPart { part: words, ..ChangedPart::default() },
-        }
-    };
-    let listed = explanation.groups.iter().zip(&explanation.changes);
-    ChangeExplanation {
-        parts: if everything { Vec::new() } else { listed.map(changed).collect() },
-        everything,
-        probability: explanation.probability,
-        remaining: explanation.remaining,
+        degrees_of_freedom,
+        p_value: chi_squared_tail(chi_squared, degrees_of_freedom as f64),
+        explanations: explanations_of(found, model.model(), &DescriptionThresholds::default()),
     }
 }

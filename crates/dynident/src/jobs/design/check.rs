@@ -1,4 +1,4 @@
-//! Check of an existing motion: a trajectory of the user, or a log after the run. No search.
+//! Check of an existing motion, without a search: a trajectory of the user, or a log after the run.
 
 use super::limit_check::{LimitCheck, SingleChanges};
 use super::outcome::{MotionOrigin, MotionReview};
@@ -19,17 +19,17 @@ use std::path::Path;
 const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
 
-/// No search for limit changes, no stop request.
+/// Neither a search for limit changes nor a stop request.
 const NO_SEARCH: SingleChanges<'static> = (&|| Ok(Vec::new()), &|| false);
 
 const MAX_SAMPLES: usize = 2_000_000;
 
-/// Largest speed of a joint at rest, relative to its peak speed.
+/// Largest velocity of a joint at which it is treated as at rest, relative to its peak velocity.
 const MAX_REST_SPEED_RATIO: f64 = 1e-3;
 
-/// Checks the trajectory in the table `trajectory` (`t_s`, `q1..` or the joint names, and both or neither of `dq1..`
-/// and `ddq1..`) like a design: every limit at 10 kHz on the quintic spline through the samples, criteria and forecast
-/// at `search.rate_hz`.
+/// Checks the trajectory in the table `trajectory` like a design. The table has `t_s`, `q1..` or the joint names, and
+/// optionally both `dq1..` and `ddq1..`. Every limit is checked at 10 kHz on the quintic spline through the samples;
+/// criteria and forecast are computed at `search.rate_hz`.
 ///
 /// # Errors
 /// If the study is invalid, or the table is missing, has other joints, or is not a valid motion.
@@ -71,9 +71,9 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
-/// Checks a log of the study, given by name or file: information of the run about each parameter. Velocities and
-/// accelerations are computed as for a fit; limits are checked on the log's samples, all of which are used in the
-/// forecast.
+/// Checks a log of the study, given by name or file: how much information the run contains about each parameter.
+/// Velocities and accelerations are computed as for a fit. Limits are checked on the log's samples; the forecast uses
+/// all samples.
 ///
 /// # Errors
 /// If the study is invalid, no log or several logs have the name, or the log cannot be read.
@@ -135,7 +135,7 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     Err(StudyError::LogName { name: name.to_owned(), found: called.len(), known })
 }
 
-/// Continuous pieces of a log as motions, joints in the order of the model, and the sample rate, Hz.
+/// Continuous pieces of a log as motions, with joints in the order of the model; and the sampling rate, Hz.
 pub(in crate::jobs) fn log_pieces(
     study: StudyFile<'_>,
     robot: &StudyRobot,
@@ -195,7 +195,7 @@ pub(in crate::jobs) fn log_pieces(
     Ok((pieces, rate_hz))
 }
 
-/// Note about joints that do not start and end at rest, which a robot cannot execute.
+/// Note about joints that are not at rest at the start and the end; a robot cannot execute such a motion.
 fn not_at_rest(given: &SampledMotion, joints: &[String]) -> Option<String> {
     let motion = given.samples();
     let moving: Vec<&str> = joints

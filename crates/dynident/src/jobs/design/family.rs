@@ -1,4 +1,4 @@
-//! Family, limits and search settings of further motions, from a study's `[design]`.
+//! Family, limits and search settings for further motions, from a study's `[design]`.
 
 use super::setup::DesignSetup;
 use crate::error::Error;
@@ -9,12 +9,12 @@ use dynident_excitation::{DesignSettings, Family};
 
 pub(in crate::jobs) struct MotionFamily {
     pub(in crate::jobs) family: Box<dyn Family>,
-    /// The limits in force: those of the robot description, the assumed ones, and the study's.
+    /// The limits that apply: those of the robot description, the assumed ones, and those of the study.
     pub(in crate::jobs) limits: Limits,
     pub(in crate::jobs) search: DesignSettings,
 }
 
-/// The motion family of a study; the speed of every joint must be limited.
+/// The trajectory family of a study; the velocity of every joint must be limited.
 ///
 /// # Errors
 /// As [`design_study`](super::design_study).

@@ -1,4 +1,4 @@
-//! Forecast by parameter name.
+//! Forecast of error bars by the names of parameters.
 
 use crate::result::{DirectionForecast, ParameterForecast};
 use crate::study::StudyRobot;
@@ -8,11 +8,11 @@ use nalgebra::DMatrix;
 const MAX_DIRECTIONS: usize = 3;
 const MAX_TERMS: usize = 6;
 
-/// Nominal values below this fraction of the largest are rounding errors of zero.
+/// Nominal values below this share of the largest are rounding errors of zero.
 const MIN_RELATIVE_NOMINAL: f64 = 1e-9;
 
-/// Predicted standard deviations from the motion's information, relative to the nominal values; `with_prior` includes
-/// prior information. The worst directions use all information.
+/// Predicted standard deviations from the information of the motion, also relative to the nominal values;
+/// `with_prior` includes prior information. The directions with the largest uncertainty use all information.
 pub(super) fn named_forecast(
     robot: &StudyRobot,
     information: &DMatrix<f64>,
@@ -21,7 +21,7 @@ pub(super) fn named_forecast(
     let columns = robot.layout().columns();
     let alone = predicted_covariance(information, MAX_DIRECTIONS);
     let all = with_prior.map(|information| predicted_covariance(information, MAX_DIRECTIONS));
-    // Rounding of angles in the robot description makes some zero values nonzero; these have no relative error.
+    // Rounded angles in the robot description make some zero values nonzero; these have no relative error.
     let largest =
         robot.nominal_base().iter().copied().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
     let expressions = robot.base().expressions();

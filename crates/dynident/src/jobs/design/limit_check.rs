@@ -7,14 +7,14 @@ use dynident_excitation::limits::{LimitSet, Relaxation, diagnose_until};
 use dynident_excitation::{Motion, grid};
 use std::path::Path;
 
-/// Sample rate of the diagnosis for a 1.2 m arm, Hz.
+/// Sampling rate of the diagnosis for an arm of 1.2 m, Hz.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 
-/// Divisor of both sample rates after a stop request.
+/// Both sampling rates are divided by this after a stop request.
 const STOPPED_RATE_DIVISOR: f64 = 10.0;
 
 pub(super) struct LimitCheck {
-    /// Utilisation of every limit at the worst moment of the motion.
+    /// For every limit, the ratio of value to limit at the worst instant of the motion.
     pub(super) reports: Vec<LimitReport>,
     pub(super) rate_hz: f64,
     pub(super) of: &'static str,
@@ -27,7 +27,7 @@ pub(super) type SingleChanges<'a> = (&'a dyn Fn() -> Result<Vec<Relaxation>, Err
 
 impl LimitCheck {
     /// Checks the motion at `rate_hz`, or at a tenth of it after a stop request. If a limit is violated, `single`
-    /// searches for single limit changes that would make another motion feasible.
+    /// searches for changes of single limits that would make another motion feasible.
     ///
     /// # Errors
     /// Invalid limits for the robot.
@@ -60,7 +60,7 @@ impl LimitCheck {
         self.diagnosis.is_empty() && self.reports.iter().all(|report| !report.violated)
     }
 
-    /// Merges the check of a later piece, which starts at `after_s`: the worse report of each limit is kept.
+    /// Adds the check of a later piece, which starts at `after_s`: for each limit the worse report is kept.
     pub(super) fn append(&mut self, later: Self, after_s: f64) {
         let first = self.reports.is_empty();
         for (place, mut report) in later.reports.into_iter().enumerate() {
@@ -94,7 +94,7 @@ fn sentences(
     if !sentences.is_empty() {
         return sentences;
     }
-    // The violation lies between the diagnosis samples.
+    // The violation is between the samples of the diagnosis.
     let broken = reports.iter().filter(|report| report.violated).map(|report| {
         let excess = 100.0 * (report.worst_ratio - 1.0).max(VIOLATION);
         format!("The {} limit of `{}` is exceeded by {excess:.4} % at {:.4} s.", report.kind, report.joint, report.at_s)

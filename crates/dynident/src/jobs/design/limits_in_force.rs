@@ -1,5 +1,5 @@
-//! Limits in force for a study's motions (robot description, assumptions, study, iteration envelope), and the torque of
-//! friction and drives that they include.
+//! Limits that apply to a study's motions (robot description, assumptions, study, envelope of the iteration), and the
+//! torque of friction and drives that they include.
 
 use super::prior;
 use crate::error::{Error, StudyError};
@@ -16,11 +16,11 @@ use std::path::Path;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LimitsFor<'a> {
-    /// A search, which keeps a margin inside the iteration's envelope.
+    /// A search, which keeps a margin to the envelope of the iteration.
     Search,
     /// An existing motion with these start positions.
     Motion(&'a [f64]),
-    /// Approach and return paths.
+    /// Approach and return paths of an iteration.
     Ways,
     /// A log of a finished run: no assumed limits.
     Log,
@@ -41,7 +41,7 @@ pub(super) fn in_force(
     let starts = starts.map_err(Error::section(study.path, "design"))?;
     let mut given = section.limits.clone();
     if purpose == LimitsFor::Log {
-        // A log may be of a faster run.
+        // A log can come from a faster run than the scaled limits permit.
         given.scale = LimitScale::default();
     }
     let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());
@@ -136,8 +136,8 @@ fn starts(
     Ok(StartPositions { start, home: home.unwrap_or_default() })
 }
 
-/// Limits of a study's robot for the motion that commands cause: without acceleration, jerk, torque and power, which
-/// the drive limits.
+/// Limits of a study's robot for the motion that position commands cause. Acceleration, jerk, torque and power are
+/// not limited, because the drive limits them.
 ///
 /// # Errors
 /// As [`in_force`].
@@ -162,7 +162,7 @@ fn known_torque(robot: &StudyRobot, described: KnownTorque) -> KnownTorque {
     valued.fold(described, |known, (term, value)| known.with(term.clone(), value))
 }
 
-/// Adds typical friction and drive inertia for unknown terms, and returns the joints that use them.
+/// Adds typical friction and drive inertia where they are unknown, and returns the joints with typical values.
 fn with_typical(robot: &StudyRobot, known: KnownTorque) -> (KnownTorque, Vec<String>) {
     let Some(typical) = with_typical_drives(&robot.parametric) else { return (known, Vec::new()) };
     let values = &typical[robot.model().inertial_count()..];
@@ -193,7 +193,7 @@ fn is_known(known: &KnownTorque, joint: usize, property: Option<JointProperty>) 
     })
 }
 
-/// Note about torque in the limits in addition to the rigid bodies; `None` without known torque.
+/// Note about the torque that the limits include in addition to the rigid bodies; `None` if there is none.
 pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
     let mut by_kind: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (term, _) in limits.known_torque.terms() {
@@ -211,7 +211,7 @@ pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
         .then(|| format!("torque limits include, in addition to the rigid bodies: {}", parts.join("; ")))
 }
 
-/// Torque that the limits do not include because it is unknown, with the margin of each limit.
+/// Note about torque that the limits do not include because it is unknown, with the margin of each limit.
 pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[LimitReport]) -> Vec<String> {
     let model = robot.model();
     let limited: Vec<(usize, &LimitReport)> = reports

@@ -36,11 +36,12 @@ use setup::DesignSetup;
 use std::path::Path;
 use step_wise::step_wise;
 
-/// Designs the motion of a study's `[design]` (defaults without this section). `watch` receives the progress and may
-/// stop the search; then the best motion so far is the result, with limits checked at a tenth of the sample rate.
+/// Designs the motion of a study's `[design]` (with defaults if this section is missing). `watch` receives the
+/// progress and can stop the search. The best motion so far is then the result, with limits checked at a tenth of the
+/// sampling rate.
 ///
-/// The terms are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
-/// motion that violates one is returned with `feasible` false and a diagnosis.
+/// The terms are those of `[drive]`, with a smoothed sign function for Coulomb friction. Limits are checked again at
+/// 10 kHz. A motion that violates a limit is returned with `feasible` false and a diagnosis.
 ///
 /// # Errors
 /// If the study, the robot description, the settings of the family, the start, the prior, the task or the limits are
@@ -55,7 +56,7 @@ pub fn design_study(
     let mut setup = DesignSetup::for_search(study, options)?;
     let longest = Expected::Range(0.0, DesignSection::longest_s(setup.robot.model()));
     longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study.path, "design"))?;
-    // The search takes long, so files may change after they have been read and hashed.
+    // The search takes long, so files could change after they were read and hashed.
     let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, options.data.as_deref(), &[]))?;
     let is_stopped = AtomicBool::new(false);
     let watch = |progress: &DesignProgress| {

@@ -20,7 +20,7 @@ use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
 use nalgebra::DMatrix;
 
-/// Sample rate of plots for a 1.2 m arm, Hz.
+/// Sampling rate of plots for an arm of 1.2 m, Hz.
 const PLOT_RATE_HZ: f64 = 100.0;
 
 pub(super) struct MotionOrigin {
@@ -60,7 +60,7 @@ impl MotionOrigin {
         }
     }
 
-    /// The given trajectory or log with this name.
+    /// Creates the result of the given trajectory or log with this name.
     pub(super) fn given(setup: &DesignSetup, name: String, motion: SampledMotion, known: &MotionInformation) -> Self {
         Self {
             family: "given".to_owned(),
@@ -96,9 +96,9 @@ pub struct DesignOutcome {
     pub file: DesignFile,
     /// The robot.
     pub robot: StudyRobot,
-    /// Limits in force: those of the robot description, overridden by the study.
+    /// Limits that apply: those of the robot description, with those of the study replacing them.
     pub limits: Limits,
-    /// Generations of the search; empty for gradients.
+    /// Generations of the search; empty for a search with gradients.
     pub history: Vec<Generation>,
     /// The robot with the payload of the motion.
     loaded: Model,
@@ -169,7 +169,7 @@ impl DesignOutcome {
         self.robot.model().characteristic_scale().round_hertz(PLOT_RATE_HZ)
     }
 
-    /// Samples the motion at `0, 1/rate, ..` and at its end; for a log with gaps its longest piece.
+    /// Samples the motion at `0, 1/rate, ..` and at its end; for a log with gaps, only its longest piece.
     pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
         let duration_s = self.family.duration_s();
         let steps = (duration_s * rate_hz - 1e-9).ceil().max(1.0) as usize;
@@ -180,7 +180,7 @@ impl DesignOutcome {
     }
 
     /// Torque along a motion from nominal inertials and known friction and drives (at rest the middle of the friction
-    /// range), joint-major as the motion, Nm (N); `None` if the inertials of a body are unknown.
+    /// range), joint-major like the motion, Nm (N); `None` if the inertials of a body are unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
         let model = &self.loaded;
         if !model.bodies_without_prior().is_empty() {
@@ -203,7 +203,7 @@ impl DesignOutcome {
         Some(torque)
     }
 
-    /// `report.html`: verdict, the robot that plays the motion, limits, expected error bars, curves.
+    /// Writes `report.html`: verdict, an animation of the robot, limits, expected error bars, curves.
     ///
     /// # Errors
     /// [`Error::Report`], which indicates a bug.
@@ -217,8 +217,8 @@ impl DesignOutcome {
         design_page(&self.file, &self.limits, &robot, &sampled)
     }
 
-    /// `preview.svg`: position, velocity, acceleration and, with known inertials, torque of every joint over time, with
-    /// limits as dashed lines.
+    /// Writes `preview.svg`: position, velocity, acceleration and, with known inertials, torque of every joint over
+    /// time, with limits as dashed lines.
     ///
     /// # Errors
     /// A motion that cannot be plotted.
@@ -227,8 +227,8 @@ impl DesignOutcome {
         pictures::preview(&self.file, &self.limits, &times_s, &motion, self.torque_nm(&motion).as_deref())
     }
 
-    /// `path.svg`: tool path and some poses of the arm in the base frame, from above and from the side, with floor,
-    /// column and boxes. The tool is the outermost frame on every last body.
+    /// Writes `path.svg`: path of the tool and some poses of the arm in the base frame, from above and from the side,
+    /// with floor, column and boxes. The tool is the outermost frame on every last body.
     ///
     /// # Errors
     /// A motion that cannot be plotted.
@@ -236,8 +236,7 @@ impl DesignOutcome {
         pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(self.plot_rate_hz()).1)
     }
 
-    /// `fitness.svg`: best and mean fitness per generation (the paper's Fig. 7); `None` for a search without
-    /// generations.
+    /// Writes `fitness.svg`: best and mean fitness per generation; `None` for a search without generations.
     ///
     /// # Errors
     /// A curve that cannot be plotted.

@@ -1,4 +1,4 @@
-//! Information of `[design.prior]`.
+//! Prior information from `[design.prior]`.
 
 use crate::error::{Error, StudyError};
 use crate::result::BaseParameterResult;
@@ -18,10 +18,12 @@ struct EarlierEstimate {
     base_parameter_covariance: Vec<Vec<f64>>,
 }
 
-/// Smallest size for the relative uncertainty, relative to the largest value of the same kind in the body.
+/// Smallest size to which a relative uncertainty is applied, relative to the largest value of the same kind in the
+/// body.
 const MIN_RELATIVE_SIZE: f64 = 0.1;
 
-/// Standard deviation of an unknown term parameter, SI units: no information compared with any measurement.
+/// Standard deviation of an unknown term parameter, SI units: practically no information compared with any
+/// measurement.
 const UNKNOWN_STD: f64 = 1e3;
 
 /// Prior information (inverse covariance) about the robot's base parameters, with a note about each source. `None`
@@ -61,7 +63,7 @@ pub(super) fn information(
     Ok(total)
 }
 
-/// Adds friction and drive inertia of an earlier result: every term that is alone in its base parameter. It replaces
+/// Adds friction and drive inertia of an earlier result: every term that is a base parameter by itself. They replace
 /// the joint's friction in the robot description.
 pub(super) fn with_earlier_torque(
     section: &PriorSection,
@@ -86,7 +88,8 @@ pub(super) fn with_earlier_torque(
     Ok(found.into_iter().fold(known, |known, (term, value)| known.with(term.clone(), value)))
 }
 
-/// `K diag(σ²) Kᵀ` of the base parameters: variances of the independent parameters plus those of the regrouped ones.
+/// Covariance `K diag(σ²) Kᵀ` of the base parameters: variances of the independent parameters, plus those of the
+/// regrouped parameters.
 fn cad_covariance(robot: &StudyRobot, share: f64) -> DMatrix<f64> {
     let std = standard_deviations(robot, share);
     let base = robot.base();
@@ -112,7 +115,7 @@ fn standard_deviations(robot: &StudyRobot, share: f64) -> Vec<f64> {
         for kind in KINDS {
             let of_robot = bodies.chunks_exact(10).map(|body| largest(&body[kind.clone()])).fold(0.0, f64::max);
             let own = largest(&body[kind.clone()]);
-            // 1 SI unit if all parameters of this kind are zero.
+            // The scale is 1 SI unit if all parameters of this kind are zero.
             let scale = [own, of_robot, 1.0].into_iter().find(|scale| *scale > 0.0).unwrap_or(1.0);
             std.extend(body[kind].iter().map(|value| share * value.abs().max(MIN_RELATIVE_SIZE * scale)));
         }
@@ -131,7 +134,7 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| scale[i] * matrix[(i, j)] * scale[j])
     };
     let inverse = between(&between(covariance).cholesky()?.inverse());
-    // Later steps need exact symmetry.
+    // Later steps need an exactly symmetric matrix.
     let symmetric = (&inverse + inverse.transpose()) * 0.5;
     symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }

@@ -11,20 +11,20 @@ use dynident_excitation::optimisers::{Generation, OptimiserError};
 use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients, single_changes};
 use std::path::Path;
 
-/// Displacement, rad or m, that every joint must be able to move within the duration.
+/// Displacement, rad or m, by which every joint must be able to move within the duration.
 const MIN_DISPLACEMENT: f64 = 0.05;
 
 pub(super) struct SearchResult {
     pub(super) family: Box<dyn Family>,
     pub(super) parameters: Vec<f64>,
-    /// Fixed start position of each joint, rad (m).
+    /// Given start position of each joint, rad (m).
     pub(super) start_posture: Vec<Option<f64>>,
-    /// Value of the criterion; `None` if a parameter is not excited.
+    /// Value of the criterion; `None` if the motion does not excite a parameter.
     pub(super) figure: Option<f64>,
-    /// Largest limit violation in the search; zero for a windowed design.
+    /// Largest limit violation in the search; zero for a step-wise design.
     pub(super) violation: f64,
     pub(super) windowed: Option<WindowedFile>,
-    /// Generations of the search; empty for gradients.
+    /// Generations of the search; empty for a search with gradients.
     pub(super) history: Vec<Generation>,
     pub(super) evaluations: usize,
     pub(super) seconds: f64,
@@ -97,8 +97,8 @@ fn task<'a>(setup: &'a DesignSetup, family: &'a dyn Family, criteria: &'a [&'a d
     }
 }
 
-/// Searches for single limit changes that would make another motion feasible, within the time limit of the search.
-/// `watch` may stop it.
+/// Searches for changes of single limits that would make another motion feasible, within the time limit of the
+/// search. `watch` can stop it.
 pub(super) fn changes(
     setup: &DesignSetup,
     study_path: &Path,

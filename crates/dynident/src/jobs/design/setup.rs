@@ -16,9 +16,9 @@ use nalgebra::DMatrix;
 const BLOCK_SAMPLES: usize = 4096;
 
 pub(super) struct MotionInformation {
-    /// `Σ WᵀW`: unit torque noise, 1 Nm (N).
+    /// Information matrix `Σ WᵀW` with unit torque noise, 1 Nm (N).
     pub(super) plain: DMatrix<f64>,
-    /// `Σ Wᵀ Σ⁻¹ W` with the study's torque noise.
+    /// Information matrix `Σ Wᵀ Σ⁻¹ W` with the torque noise of the study.
     pub(super) weighted: DMatrix<f64>,
 }
 
@@ -35,16 +35,16 @@ pub(super) struct DesignSetup {
     pub(super) torque_std_nm: Vec<f64>,
     ones: Vec<f64>,
     pub(super) notes: Vec<String>,
-    /// Assumed limits, and limits without a check.
+    /// Assumed limits, and possible violations that are not checked.
     pub(super) assumed: Vec<String>,
     pub(super) not_checked: Vec<String>,
     pub(super) stopwatch: Stopwatch,
-    /// The study's files before the first read.
+    /// State of the study's files before they were first read.
     pub(super) inputs: InputFiles,
 }
 
 impl DesignSetup {
-    /// For a search: smooth terms; the speed of every joint must be limited.
+    /// Prepares a search: smooth terms; the velocity of every joint must be limited.
     pub(super) fn for_search(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let smooth = smooth(&study, &mut notes);
@@ -53,12 +53,12 @@ impl DesignSetup {
         Ok(setup)
     }
 
-    /// For an existing motion with these start positions: terms as in the study.
+    /// Prepares the check of an existing motion with these start positions: terms as in the study.
     pub(super) fn for_check(study: StudyFile<'_>, options: &RunOptions<'_>, start: &[f64]) -> Result<Self, Error> {
         Self::new(study, options, Vec::new(), LimitsFor::Motion(start))
     }
 
-    /// For a log: no assumed limits.
+    /// Prepares the check of a log: no assumed limits.
     pub(super) fn for_log(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<Self, Error> {
         Self::new(study, options, Vec::new(), LimitsFor::Log)
     }
@@ -90,7 +90,7 @@ impl DesignSetup {
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
                 let sum = information(&robot, &torque_std_nm, task.given.times_s(), &motion_at);
                 let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
-                // The D-optimal motion is a better start for the task criterion than random parameters.
+                // For the prediction criterion, the D-optimal motion is a better start than random parameters.
                 vec![Box::new(DOptimal), criterion]
             }
             named => named.criteria().unwrap_or_default(),
@@ -114,7 +114,7 @@ impl DesignSetup {
         })
     }
 
-    /// Torque noise of the criterion, Nm (N).
+    /// Torque noise that the criterion uses, Nm (N).
     pub(super) fn criterion_std_nm(&self) -> &[f64] {
         if self.section.criterion.ignores_torque_noise() { &self.ones } else { &self.torque_std_nm }
     }
@@ -156,7 +156,7 @@ fn information(
     sum
 }
 
-/// Replaces sign steps by smooth steps, because a sign has no gradient.
+/// Replaces unsmoothed sign functions by smoothed ones, because a sign function has no gradient.
 fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
     let mut study = study.clone();
     let mut changed = false;
@@ -174,7 +174,7 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
     study
 }
 
-/// Checks that the speed of every joint is limited; otherwise the optimum is infinitely fast.
+/// Checks that the velocity of every joint is limited; otherwise the optimum is infinitely fast.
 fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), StudyError> {
     for joint in robot.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {

@@ -1,4 +1,5 @@
-//! The paper's criterion over windows, solved with the study's optimiser and compared with the optimum.
+//! Step-wise design over time windows (*Iterative Identification of Robot Dynamic Parameters Based on Logistic
+//! Function*, equations 9, 10 and 17 to 19), solved with the study's optimiser and compared with the optimum.
 
 use super::search::SearchResult;
 use crate::error::{Expected, StudyError};
@@ -77,7 +78,7 @@ pub(crate) fn step_wise(
     })
 }
 
-/// Settings of the family; only `spliced-logistic` has strokes with mid-points.
+/// Settings of the family. Only `spliced-logistic` has moves with mid-points, around which windows can be placed.
 fn spliced_settings(section: &DesignSection) -> Result<&SplicedLogisticSettings, StudyError> {
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
         let fix = "the criterion windowed-condition needs kind = \"spliced-logistic\", whose strokes have mid-points";
@@ -90,7 +91,7 @@ fn spliced_settings(section: &DesignSection) -> Result<&SplicedLogisticSettings,
     Ok(settings)
 }
 
-/// Strokes of a design as the vector of unknowns, with the statistics of the search.
+/// The moves (strokes) of a design as the vector of unknowns, with the statistics of the search.
 #[derive(Clone)]
 struct FoundStrokes {
     x: Vec<f64>,
@@ -99,7 +100,7 @@ struct FoundStrokes {
     history: Vec<Generation>,
 }
 
-/// Strokes found by the study's optimiser; `optimum` are those of the gradient method.
+/// The moves that the study's optimiser found; `optimum` contains those of the gradient method.
 fn searched(
     section: &DesignSection,
     problem: &StepWiseProblem,
@@ -152,7 +153,7 @@ impl StrokeMotion<'_> {
         Ok(StepWiseLogistic::new(self.offsets, &steps.collect::<Vec<_>>(), self.settings)?)
     }
 
-    /// Content of the result file; the optimum is included if it is inside all limits.
+    /// Content of the result file. The optimum is included if it keeps all limits.
     fn file(&self, windowed: &WindowedCondition, found: &FoundStrokes, optimum: &[f64]) -> WindowedFile {
         let problem = self.problem;
         let strokes = problem.strokes(&found.x);

@@ -1,4 +1,4 @@
-//! The time that a job takes.
+//! Measures the duration of a job.
 
 use crate::cpu_time::cpu_seconds;
 use std::time::Instant;

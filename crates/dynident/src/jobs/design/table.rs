@@ -1,4 +1,4 @@
-//! Reads a trajectory table: for a check, or as the task of a design.
+//! Reads a trajectory table, for a check or as the task (predicted motion) of a design.
 
 use crate::error::Error;
 use dynident_excitation::Motion;
@@ -9,21 +9,22 @@ use std::path::Path;
 
 const MAX_ROWS: usize = 1_000_000;
 
-/// Largest relative deviation of the time steps of a table without derivatives.
+/// Largest relative deviation of the time steps in a table without velocities and accelerations.
 const MAX_RELATIVE_STEP_DEVIATION: f64 = 1e-3;
 
-/// Allowed difference between positions and integrated velocities: relative to the largest step, and absolute, rad (m).
+/// Accepted difference between positions and integrated velocities: relative to the largest step, and absolute, rad
+/// (m).
 const MAX_RELATIVE_DISAGREEMENT: f64 = 0.05;
 const MIN_ALLOWED_DISAGREEMENT: f64 = 1e-3;
 
 pub(crate) struct Trajectory {
     pub(crate) given: SampledMotion,
-    /// Method of velocity and acceleration if they are not in the table.
+    /// Note about the method that computed velocity and acceleration, if the table does not contain them.
     pub(crate) note: Option<String>,
 }
 
-/// Reads `t_s`, `q1..` (or the joint names), and `dq1..`, `ddq1..` if the table has both; otherwise the study's
-/// differentiator computes them.
+/// Reads `t_s`, `q1..` (or the joint names), and `dq1..`, `ddq1..` if the table has both. Otherwise the study's
+/// differentiator computes velocities and accelerations.
 pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettings) -> Result<Trajectory, Error> {
     let wrong = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
     let broken = |error: &csv::Error| wrong(error.position().map_or(1, csv::Position::line), error.to_string());
@@ -64,7 +65,7 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
         return Err(wrong(1, format!("{} rows: a motion needs two or more", times_s.len())));
     }
 
-    // Derivatives of the table are checked against its positions.
+    // Velocities and accelerations of the table are compared with its positions.
     let mut motion = Motion { samples: times_s.len(), joints: joints.len(), ..Motion::default() };
     let note = if groups.len() == 3 {
         disagreement(&times_s, &groups, joints).map_or(Ok(()), |(row, message)| Err(wrong(lines[row], message)))?;
@@ -128,14 +129,14 @@ impl Columns {
     }
 }
 
-/// `n` of `q<n>`.
+/// The number n in a column name such as `q<n>`.
 fn number_of(column: &str, group: &str) -> Option<usize> {
     let digits = column.strip_prefix(group)?;
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }
 
-/// Finds a row where positions do not match velocities and accelerations, with a message. `q₁ - q₀` equals `h (q̇₀ +
-/// q̇₁) / 2 - h² (q̈₁ - q̈₀) / 12` up to `h⁵ q⁽⁵⁾ / 720`.
+/// Finds a row whose positions do not agree with velocities and accelerations, with a message. Over a step h, `q₁ -
+/// q₀` equals `h (q̇₀ + q̇₁) / 2 - h² (q̈₁ - q̈₀) / 12` up to `h⁵ q⁽⁵⁾ / 720`.
 fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) -> Option<(usize, String)> {
     joints.iter().enumerate().find_map(|(joint, name)| {
         let [q, dq, ddq] = [&groups[0][joint], &groups[1][joint], &groups[2][joint]];

@@ -25,12 +25,12 @@ use dynident_model::terms::{TermClass, TorqueTerm};
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
-/// A form with options.
+/// An export format with its options.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExportSettings {
-    /// The form.
+    /// Export format.
     pub target: Target,
-    /// Options of code.
+    /// Options for exported code.
     pub code: CodeOptions,
 }
 
@@ -40,8 +40,8 @@ impl From<Target> for ExportSettings {
     }
 }
 
-/// Exports the model of a `result.json` in the form `form`: bodies, friction and drives as in `identified.urdf`
-/// (physically consistent unless the study disables this). `study` is the study of the result; its robot is also
+/// Exports the model of a `result.json` in the format `form`: bodies, friction and drives as in `identified.urdf`
+/// (physically consistent unless the study disables this). `study` is the study of the result; the robot file is also
 /// searched in the folder `data`.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn export_result(
     written(stored, result_path, &robot, form.into())
 }
 
-/// As [`export_result()`] without the study: for a result that holds its robot.
+/// Like [`export_result()`] without the study: for a result that contains its robot.
 ///
 /// # Errors
 /// A result of an older version, which does not hold its robot; [`Error::Export`] for what the form cannot hold at all.
@@ -96,7 +96,7 @@ pub fn export_stored(
     written(stored, result_path, &robot, form.into())
 }
 
-/// The identified robot in a form, with the terms that were fitted for the class of the form.
+/// The identified robot for an export format, with the terms that were fitted for the format's class.
 fn written(
     stored: &ResultFile,
     result_path: &Path,
@@ -131,7 +131,7 @@ fn written(
     let made = || {
         let (terms, values) = match (form, target.class()) {
             (Some(form), _) => terms_of(form),
-            // Without fitted terms, those of the result with the steps of the class.
+            // Without fitted terms, the terms of the result are used with the sign functions of the class.
             (None, Some(class)) => {
                 robot.terms().map(|(term, value)| (class.in_form(robot.model(), term), value)).unzip()
             }
@@ -207,15 +207,15 @@ fn robot_model(
         .map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
 }
 
-/// The robot with the velocities of the training logs; results of earlier versions contain none.
+/// The robot with the recorded velocities of the training logs; results of earlier versions contain none.
 fn with_velocities(stored: &ResultFile, robot: RobotModel) -> Result<RobotModel, ExportError> {
     let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
     let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), robot.model().dof());
     robot.with_velocities(velocities)
 }
 
-/// Exports a payload of a `result.json` as a command for the controller of `reader`: the physically consistent body, in
-/// the frame of its link. `name` may be `None` if there is only one payload.
+/// Exports a payload of a `result.json` as a command for the controller of manufacturer `reader`: the physically
+/// consistent body, in the frame of its link. `name` can be `None` if there is only one payload.
 ///
 /// # Errors
 /// A result without payloads or without this one, a payload without a physically consistent body.
@@ -241,7 +241,7 @@ pub fn export_payload_of(
     };
     let (mass_kg, com_m, inertia) = match (&found.controller, &found.possible) {
         (Some(body), _) => (body.mass_kg, body.com_m, body.inertia_at_com_kgm2),
-        // Results of older versions.
+        // For results of earlier versions.
         (None, Some(body)) => (body.mass_kg, body.com_m, body.inertia_at_com_kgm2),
         (None, None) => return Err(inconsistent()),
     };
@@ -257,13 +257,13 @@ pub fn export_payload_of(
     notes.extend(found.not_identified.iter().map(|what| format!("Not measured: {what}")));
     notes.extend(stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")));
     let payload = PayloadBody { name: found.name.clone(), inertial };
-    // Results of older versions have no intervals for the comment.
+    // Results of earlier versions have no intervals for the comment.
     let comment = if found.controller.is_some() { &notes[..] } else { &[] };
     let text = payload_command(&payload, reader, comment).ok_or_else(inconsistent)?;
     Ok(Exported { text, notes })
 }
 
-/// The payload of a result with this name, or its only one.
+/// The payload of a result with this name, or its only payload.
 ///
 /// # Errors
 /// A result without payloads, without this one, or with several if `name` is `None`.
@@ -283,7 +283,8 @@ pub fn selected_payload<'a>(
     }
 }
 
-/// The ten values of a payload with their intervals, one sentence each, and the rule for those of the round body.
+/// The ten values of a payload with their intervals, one sentence each, and the rule for values that were assumed for
+/// a round body.
 fn value_notes(body: &ControllerPayload) -> Vec<String> {
     let value = |one: &ControllerValue| {
         let start = format!("{} = {:.5e} {}", one.name, one.value, one.unit);

@@ -8,7 +8,7 @@ use dynident_export::{Actuator, Exported, isaac_lab};
 use dynident_model::InertialParameters;
 use std::path::Path;
 
-/// A form of drives with a position controller.
+/// An export format for drives with a position controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServoTarget {
     /// Actuators of Isaac Lab: a Python module.
@@ -19,21 +19,21 @@ pub enum ServoTarget {
     Urdf,
 }
 
-/// An exported file with the forms whose errors it has.
+/// An exported file, and the formats whose errors it contains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServoExport {
     /// Text and notes.
     pub exported: Exported,
-    /// The losses of the file, and the error of the motion simulated with it. Empty for URDF, which contains no
-    /// position controller, and for results of older versions.
+    /// Parts of the drives that the file cannot represent, and the error of the motion simulated with the file. Empty
+    /// for URDF, which contains no position controller, and for results of earlier versions.
     pub forms: Vec<ServoForm>,
 }
 
-/// Physics step of a module from a result without errors, s: that of many tasks of Isaac Lab.
+/// Physics step of a module from a result without motion errors, s: the value of many Isaac Lab tasks.
 const PHYSICS_STEP_S: f64 = 0.005;
 
-/// Exports the drives of a result of commands and positions. The robot descriptions need the `study` of the result,
-/// with its path, and `data`, a further folder of its files.
+/// Exports the drives of a result that was identified from commands and positions. The robot descriptions need the
+/// `study` of the result with its path, and `data`, a further folder for its files.
 ///
 /// # Errors
 /// A robot description without the study, or one that does not match the result or cannot be written.
@@ -103,7 +103,7 @@ fn actuators(file: &ServoFile) -> Vec<Actuator> {
     file.joints.iter().zip(&file.drives).map(of_joint).collect()
 }
 
-/// The robot description of the study with the values of the result.
+/// The robot description of the study with the identified values.
 fn description(
     file: &ServoFile,
     result_path: &Path,

@@ -9,9 +9,9 @@ use dynident_identification::examination::{LagKind, TorqueLag};
 use std::path::Path;
 
 /// Exports armature, damping, frictionloss, delay and actuator gain of every joint in the conventions of simulators,
-/// with error bars: friction is the best approximation of the identified law over the recorded velocities, error bars
-/// use the covariance of `result.json`. `study` is the study of the result; its robot is also searched in the folder
-/// `data`.
+/// with error bars. Friction is the best approximation of the identified law over the recorded velocities. Error bars
+/// use the covariance of `result.json`. `study` is the study of the result; the robot file is also searched in the
+/// folder `data`.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot.
@@ -73,7 +73,7 @@ fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
     }
 }
 
-/// Index of the base parameter that equals a term, if it is excited.
+/// Index of the base parameter that equals a term, if the logs excite it.
 fn base_place(stored: &ResultFile, term: &TermResult) -> Option<usize> {
     let place =
         stored.base_parameters.iter().position(|base| Some(&base.expression) == term.base_parameter.as_ref())?;

@@ -11,21 +11,21 @@ use dynident_identification::payload::ControllerPayload;
 use dynident_model::terms::{TermClass, TorqueTerm};
 use sha2::{Digest, Sha256};
 
-/// End of the name of the file with the held-out error of an exported file: `arm.urdf.validation.json`.
+/// Ending of the name of the file with the held-out error of an exported file: `arm.urdf.validation.json`.
 pub const EXPORT_VALIDATION_SUFFIX: &str = ".validation.json";
 
-/// What a result contains about the validation of an exported file: the errors of the form and of the
-/// model on each held-out log, the terms left out, and the SHA-256 of `text`. `file` is the name of the exported file.
+/// Content of the validation file of an exported file: the held-out errors of the exported format and of the model on
+/// each log, the omitted terms, and the SHA-256 of `text`. `file` is the name of the exported file.
 pub fn export_validation(stored: &ResultFile, target: Target, file: &str, text: &str) -> ExportValidationFile {
     of_class(stored, (target.name(), target.class()), file, text)
 }
 
-/// As [`export_validation()`] for a D-H table, which holds what URDF holds.
+/// Like [`export_validation()`] for a D-H table, which can represent the same terms as URDF.
 pub fn table_validation(stored: &ResultFile, file: &str, text: &str) -> ExportValidationFile {
     of_class(stored, ("dh", Target::Urdf.class()), file, text)
 }
 
-/// As [`export_validation()`] for a payload in the form with this name: the interval of each value.
+/// Like [`export_validation()`] for a payload in the format with this name: the interval of each value.
 pub fn payload_validation(
     stored: &ResultFile,
     payload: Option<&ControllerPayload>,
@@ -36,7 +36,8 @@ pub fn payload_validation(
     ExportValidationFile { payload: payload.cloned(), ..empty(stored, form, file, text) }
 }
 
-/// As [`export_validation()`] for drives from commands: the error of the motion that is simulated with the file.
+/// Like [`export_validation()`] for drives identified from commands: the error of the motion that is simulated with
+/// the file.
 pub fn servo_validation(
     stored: &ServoFile,
     forms: &[ServoForm],
@@ -56,7 +57,7 @@ fn of_class(
 ) -> ExportValidationFile {
     let mut validation = empty(stored, name, file, text);
     match class.map(|class| stored.forms.iter().find(|form| form.class == class)) {
-        // The form contains the complete model.
+        // The format contains the complete model.
         None => validation.held_out = errors_of_model(stored),
         Some(None) => {}
         Some(Some(form)) => {
@@ -87,7 +88,7 @@ fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValid
     without_errors((stored.provenance.as_ref(), &stored.name, &stored.problems), form, file, text)
 }
 
-/// An exported file of a result with this provenance, name and problems.
+/// Validation of an exported file with this provenance, name and problems, without errors.
 fn without_errors(
     (provenance, name, problems): (Option<&Provenance>, &str, &[String]),
     form: &str,
@@ -96,7 +97,7 @@ fn without_errors(
 ) -> ExportValidationFile {
     let mut provenance = provenance.cloned();
     if let Some(provenance) = &mut provenance {
-        // The seal of another file.
+        // The hash belongs to another file.
         provenance.content_sha256 = None;
     }
     ExportValidationFile {

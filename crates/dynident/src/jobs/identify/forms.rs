@@ -1,4 +1,4 @@
-//! The model in each class of forms, for the result.
+//! The model in each class of export formats, for the result file.
 
 use crate::result::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
 use crate::study::Study;
@@ -9,7 +9,7 @@ use dynident_identification::forms::FormFit;
 use dynident_model::InertialParameters;
 use dynident_model::terms::{TermClass, TorqueTerm};
 
-/// The results of all classes of forms.
+/// The results for all classes of export formats.
 pub(super) fn form_results(found: &Identification) -> Vec<FormResult> {
     found.forms.iter().map(|form| form_result(found, form)).collect()
 }
@@ -38,7 +38,8 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
     }
 }
 
-/// The identified robot; `None` if a body has no parameters. Limits that the description lacks are those of the study.
+/// The identified robot; `None` if a body has no parameters. If the description has no limit, that of the study is
+/// used.
 pub(super) fn stored_model(
     study: &Study,
     found: &Identification,

@@ -4,17 +4,18 @@ use dynident_identification::Identification;
 use dynident_model::JointChange;
 use dynident_model::terms::{JointProperty, TermClass, TorqueTerm};
 
-/// The new values of the joints in a form of a class.
+/// The new values of the joints for an export format of a class.
 pub(super) struct JointValues {
     /// New damping, friction, drive inertia and stiffness.
     pub(super) changes: Vec<JointChange>,
-    /// Whether this export format cannot hold some terms, and the other terms were fitted again to replace them.
+    /// Whether the export format cannot represent some terms, and the other terms were fitted again to replace them.
     pub(super) is_refitted: bool,
 }
 
 impl JointValues {
-    /// Values of the terms that a description of this class has a place for. They were fitted again for the class if
-    /// it cannot hold all terms of the model. Without such a fit (unknown gains) they are the model's own values.
+    /// Values of the terms that a robot description of this class can contain. If it cannot represent all terms of
+    /// the model, they were fitted again for the class. Without such a fit (unknown gains) they are the model's own
+    /// values.
     pub(super) fn of(found: &Identification, class: TermClass) -> Self {
         let model = &found.model().parametric;
         let form = found.forms.iter().find(|form| form.class == class);
@@ -39,7 +40,7 @@ impl JointValues {
     }
 }
 
-/// The change of the joint `name`, a new one if there is none yet.
+/// Returns the change of the joint `name`; creates it if there is none yet.
 fn change_of<'a>(changes: &'a mut Vec<JointChange>, name: &str) -> &'a mut JointChange {
     let place = changes.iter().position(|change| change.joint == name).unwrap_or_else(|| {
         let joint = name.to_owned();

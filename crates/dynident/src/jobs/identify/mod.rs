@@ -84,9 +84,9 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     identify_unchanged(StudyFile::new(study, study_path), options, None)
 }
 
-/// Like [`identify()`] with the method `"instrumental"`, regardless of the study, and instruments from `source`: a
-/// simulation of the closed loop with the current model (IDIM-IV: repeat with a new simulation until the parameters
-/// converge), or a repeated run.
+/// Like [`identify()`] with the method `"instrumental"`, regardless of the method in the study. The instruments come
+/// from `source`: a simulation of the closed loop with the current model (IDIM-IV: repeat with a new simulation until
+/// the parameters converge), or a repeated run.
 ///
 /// # Errors
 /// As [`identify()`], and errors of `source`.
@@ -119,17 +119,17 @@ fn identify_from_files(
     study.require_training_log(study.path)?;
     let folders = study.folders(options.data.as_deref());
     let arm = study.arm.as_ref().map(|section| known_arm(section, &folders)).transpose()?;
-    // Uses the friction that was selected when the arm was identified.
+    // The friction that was selected when the arm was identified is used again.
     let with_arm = arm.as_ref().map(|(_, stored)| stored.as_fitted(&study));
     let study = study.with_study(with_arm.as_ref().unwrap_or(study.study));
     let robot = study.robot_in(&folders)?;
     let in_study = Error::identification::<IdentificationError>(study.path);
     // Names are checked before any log is read.
-    // The study is always examined, because any result may be used.
+    // The study is always examined (as by `check`), because any result may be used.
     let mut settings = study.settings(study.path, &robot)?;
     settings.diagnosis = DiagnosisChoice::Always;
     if source.is_some() {
-        // Instruments need the terms that the study states.
+        // Instruments need fixed terms, so the friction terms of the study are used.
         let is_auto = |search: &FrictionSearch| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto);
         settings.friction = settings.friction.retaining(is_auto);
         settings.drive_inertia.clear();
@@ -268,7 +268,7 @@ fn physical_verdict(study: &Study, found: &Identification, inertials: &[Inertial
     verdict
 }
 
-/// A result without URDF is still valid if a URDF cannot express its parameters.
+/// A result remains valid if URDF cannot express its parameters.
 fn exported_model(
     (study, robot): (&Study, &StudyRobot),
     task: &IdentificationTask,
@@ -393,7 +393,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
-    // The best hypothesis gives the mistake; sign findings of single joints are consequences of it.
+    // The best hypothesis already gives the mistake; findings about the sign of single joints are consequences of it.
     let is_explained = found.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.search.best.is_some());
     let mut all: Vec<LogSummary> = training.chain(held_out).collect();
     let indices = found.training.logs.iter().map(|log| log.index).chain(found.held_out.iter().map(|log| log.index));

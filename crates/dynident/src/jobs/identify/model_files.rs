@@ -27,8 +27,8 @@ pub(super) struct ModelFiles {
 }
 
 /// Writes the new values into the user's robot description; locked joints keep their values. A URDF converted from
-/// another format has the limits of `study` where the description lacks them. The error is the reason
-/// for a missing description.
+/// another format has the limits of `study` where the description has none. The error is the reason for a missing
+/// description.
 pub(super) fn model_files(
     study: &Study,
     robot: &StudyRobot,
@@ -71,7 +71,7 @@ pub(super) fn model_files(
     }
 }
 
-/// The same with the springs of the joints, which SDF has and URDF has not.
+/// The same values with the springs of the joints, which SDF can represent and URDF cannot.
 fn with_springs(found: &Identification, joints: &[JointChange]) -> Vec<JointChange> {
     let springs = JointValues::of(found, TermClass::DampingFrictionAndInertia).changes;
     let spring = |joint: &JointChange| springs.iter().find(|own| own.joint == joint.joint)?.stiffness;
@@ -83,9 +83,9 @@ fn lost_in_urdf(property: Option<JointProperty>) -> bool {
     !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
 }
 
-/// Changes for MJCF and SDF, where links behind locked joints (MJCF) or fixed links (SDF) keep their mass: MuJoCo
-/// rejects a moving body without mass, and SDF assumes 1 kg for a link without mass. The body that carries them gets
-/// the difference.
+/// Changes for MJCF and SDF. Links behind locked joints (MJCF) or fixed links (SDF) keep their mass in these formats:
+/// MuJoCo rejects a moving body without mass, and SDF assumes 1 kg for a link without mass. The body that carries
+/// such links gets the remaining part.
 fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) -> Result<Vec<LinkChange>, String> {
     let is_sdf = robot.robot.format == DescriptionFormat::Sdf;
     let mut rest = inertials.to_vec();
@@ -148,8 +148,8 @@ struct BodyNotes<'a> {
 }
 
 impl BodyNotes<'_> {
-    /// Writes the comment of a body: error bar of its mass, identifiable values, and drive values that the file cannot
-    /// express or only approximates.
+    /// Writes the comment of a body: error bar of its mass, identifiable values, and drive values that the file
+    /// cannot express or only approximates.
     fn note(&self, lost: fn(Option<JointProperty>) -> bool, changes: &mut [LinkChange]) {
         let Self { model, parameters, std, sources, is_refitted } = self;
         for (index, (body, sources)) in model.model().bodies().iter().zip(*sources).enumerate() {
@@ -168,7 +168,7 @@ impl BodyNotes<'_> {
                 let _ = write!(text, "; mass {:.4} kg ± {:.2e} kg (95 %)", parameters[10 * index], HALF_WIDTH_95 * std);
             }
             let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
-            // A coupling of two joints is listed at the first.
+            // A coupling of two joints is listed at the first joint.
             let is_here = |term: &TorqueTerm| term.joints().first() == Some(&index);
             let lost = terms.filter(|(term, _)| is_here(term) && lost(term.property()));
             let lost: Vec<String> =
@@ -248,8 +248,8 @@ fn provenance_line(provenance: &Provenance, errors: &str) -> String {
     dynident_text::xml::comment(&line)
 }
 
-/// Notes links behind locked joints in a body's comment: the values are valid only with these joints locked at the same
-/// positions.
+/// Notes links behind locked joints in a body's comment: the values are only valid while these joints are locked at
+/// the same positions.
 fn note_locked(robot: &StudyRobot, changes: &mut [LinkChange]) {
     for body in robot.model().bodies() {
         let own = robot.robot.model.bodies().iter().find(|original| original.name() == body.name());

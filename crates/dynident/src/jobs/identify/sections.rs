@@ -71,7 +71,7 @@ pub(super) fn method_summary(study: &Study, identification: &Identification) -> 
     }
 }
 
-/// Messages about declared torques that coincide with other parameters.
+/// Messages about declared torques that are combinations of other parameters.
 fn coincident(model: &RegressorModel) -> Vec<String> {
     let of_term = |(term, others): (&TorqueTerm, Vec<String>)| {
         let joint = term.own_joint().map_or("", |joint| &model.model().joints()[joint].name);
@@ -122,7 +122,7 @@ pub(super) fn base_parameters(
         .collect()
 }
 
-/// Sources of the ten values of each body; unexcited base parameters are not measured.
+/// Sources of the ten values of each body. A value is not measured if the logs do not excite its base parameters.
 pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[ValueSource; 10]> {
     let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
     let all = model.base().determination(&fixed, typical_length_m(model.model()));
@@ -173,7 +173,7 @@ pub(super) fn term_results(
     let of_term = |(x, term): (usize, &TorqueTerm)| {
         let column = first_term + x;
         let place = model.base().independent().iter().position(|&index| index == column);
-        // A term with other parameters regrouped into it is not alone.
+        // A term with other parameters regrouped into it is not a base parameter by itself.
         let alone = place.filter(|&place| expressions[place] == term.symbol());
         let home = place.or_else(|| {
             let d = model.base().dependent().iter().position(|&index| index == column)?;
@@ -192,7 +192,7 @@ pub(super) fn term_results(
     model.terms().iter().enumerate().filter(|(_, term)| wanted(term)).map(of_term).collect()
 }
 
-/// Deviations of each log's offsets from their mean; the last log's deviation is minus the sum of the others.
+/// Deviations of each log's offsets from their mean. The deviation of the last log is minus the sum of the others.
 pub(super) fn offset_results(identification: &Identification, recordings: &[Recording]) -> Vec<LogOffset> {
     let (model, columns, estimate) =
         (identification.model(), &identification.training.columns, identification.estimate());
@@ -249,7 +249,7 @@ pub(super) fn training_result(
     let values = &identification.estimate().values;
     let base = identification.training.columns.base();
     let (samples, estimate) = training_errors(identification, values)?;
-    // Offsets of single logs and payloads use the estimate.
+    // Offsets of single logs and payloads use the unconstrained estimate.
     let written = identification.consistent_base_values().map(|written| [written, &values[base..]].concat());
     let physical = written.map(|written| training_errors(identification, &written)).transpose()?;
     Ok(TrainingResult {

@@ -9,9 +9,9 @@ use nalgebra::DMatrix;
 
 const BLOCK_SAMPLES: usize = 4096;
 
-/// Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the used samples of the trajectories, for
-/// white torque noise and exact positions; `None` without torque noise, with correlated noise, or with an unexcited
-/// parameter.
+/// Cramér-Rao bound of every base parameter, `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` with regressor W and torque noise Σ_τ. The sum
+/// is over the used samples of the trajectories, for white torque noise and exact positions. `None` without torque
+/// noise, with correlated noise, or if the motion does not excite a parameter.
 pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = robot.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
@@ -35,7 +35,7 @@ pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSetti
                 own += information(robot, whole, &alone, &samples);
             }
         }
-        // Ratio of recorded to controlled samples.
+        // The sum is multiplied by the ratio of recorded to controlled samples.
         sum += own * (sensors.record_rate_hz.unwrap_or(rate_hz) / rate_hz);
     }
     let count = sum.nrows();
@@ -48,7 +48,7 @@ pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSetti
     Some((0..count).map(|k| inverse[(k, k)].sqrt() / scale[k]).collect())
 }
 
-/// `Σ Wᵀ Σ_τ⁻¹ W` over selected samples of a motion.
+/// Information `Σ Wᵀ Σ_τ⁻¹ W` over selected samples of a motion (regressor W, torque noise Σ_τ).
 fn information(robot: &StudyRobot, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
     let dof = robot.model().dof();
     let mut gatherer = Information::new(robot.model(), robot.layout(), std, None);

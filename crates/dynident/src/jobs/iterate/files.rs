@@ -12,7 +12,7 @@ const PAGE: &str = "report.html";
 
 pub(super) struct ResultFiles<'a> {
     out: &'a Path,
-    /// Whether robot and page in the folder are from an iteration. Those of another command are kept until this
+    /// Whether robot and page in the folder come from an iteration. Files of another command are kept until this
     /// iteration writes its own.
     robot_is_own: bool,
 }
@@ -46,7 +46,7 @@ impl<'a> ResultFiles<'a> {
         .write()
     }
 
-    /// Removes the page of an earlier iteration; `identify` writes a page with the same name.
+    /// Removes the page of an earlier iteration, because `identify` writes a page with the same name.
     fn without_page(&self, set: OutputSet) -> OutputSet {
         if self.robot_is_own { set.absent(PAGE) } else { set }
     }

@@ -12,7 +12,7 @@ use std::path::Path;
 pub(super) struct Inputs {
     pub(super) section: IterationSection,
     pub(super) simulation: SimulationSection,
-    /// The input files before the first read.
+    /// State of the input files before they were first read.
     pub(super) files: InputFiles,
     pub(super) folders: Folders,
     pub(super) robot: StudyRobot,
@@ -51,7 +51,7 @@ impl Inputs {
     }
 }
 
-/// The program of the study's robot, if it may be started.
+/// The program of the study's robot, if starting it is permitted.
 pub(super) fn permitted_program(
     section: &IterationSection,
     study_path: &Path,

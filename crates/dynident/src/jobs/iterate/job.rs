@@ -20,7 +20,7 @@ impl Job<'_> {
         Error::section(self.study.path, "iteration")(why)
     }
 
-    /// Maps an error of the iteration to a file, the state in the folder, or the table `[iteration]`.
+    /// Assigns an error of the iteration to a file, to the state in the folder, or to the table `[iteration]`.
     pub(super) fn iteration_error(&self, error: IterationError) -> Error {
         match error {
             IterationError::File { path, source } => Error::Output { path, source },

@@ -1,4 +1,4 @@
-//! The legs of an iteration: their trajectories, stages and robots.
+//! The trajectories of an iteration (legs): their references, stages and robots.
 
 use super::trajectory::Trajectory;
 use crate::error::{Error, StudyError};
@@ -14,10 +14,10 @@ use dynident_iteration::{HeldOutMotion, Leg};
 use dynident_simulation::controllers::ControllerModel;
 use dynident_system::PermittedProgram;
 
-/// Decorrelates the noise of legs with separate iterations.
+/// Decorrelates the noise of trajectories with separate iterations.
 const SEED_STEP_PER_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 
-/// The trajectory of each leg; the study's trajectory is designed once, and again for each known payload.
+/// The reference of each trajectory (leg). The study's motion is designed once, and again for each known payload.
 pub(super) fn trajectories(
     study: StudyFile<'_>,
     robot: &StudyRobot,
@@ -58,7 +58,7 @@ pub(super) fn trajectories(
     Ok(all)
 }
 
-/// The legs with their references and windows.
+/// The trajectories (legs) with their references and time windows.
 pub(super) fn legs(
     section: &IterationSection,
     trajectories: &[Trajectory],
@@ -112,8 +112,8 @@ pub(super) fn held_out_motion(
     Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
 }
 
-/// Robots of one iteration: one simulator per leg, or the external robot (`program` is the permitted program of the
-/// study); empty for a robot of the caller.
+/// Robots of one iteration: one simulator per trajectory, or the external robot (`program` is the permitted program
+/// of the study); empty for a robot of the caller.
 pub(super) fn robots(
     section: &IterationSection,
     simulation: &SimulationSection,
@@ -134,14 +134,14 @@ pub(super) fn robots(
             if stage > 0 {
                 settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
             }
-            // Used to detect a wrong torque unit; without a model the torques are not compared.
+            // The prior model is used to detect a wrong torque unit; without it the torques are not compared.
             let prior = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).ok();
             vec![Box::new(FolderRobot::new(settings, joints)?.with_prior(prior))]
         }
         RobotChoice::Function => Vec::new(),
         RobotChoice::Simulation => {
             let mut simulation = simulation.clone();
-            // The runs of every leg start at 1, but their noise must differ.
+            // The numbers of runs start at 1 for every separately iterated trajectory, but the noise must differ.
             simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_STEP_PER_LEG);
             let mut robots: Vec<Box<dyn Robot>> = Vec::new();
             for &member in members {

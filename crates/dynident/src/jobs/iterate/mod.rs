@@ -37,10 +37,10 @@ use std::path::Path;
 use std::time::Instant;
 use trajectories::{Trajectories, load_or_make};
 
-/// Iterates a study's robot and writes the results to `out`: `trajectory.json` (trajectories at the controller's rate),
-/// `runs/run_k/` (each run is written completely or not at all; with sequential legs `leg_n/runs/run_k/`),
-/// `iterations.json` after every run, and `report.html` at the end. With `resume`, runs in the folder are not repeated:
-/// a call that continues after an interruption reaches the same result.
+/// Iterates a study's robot and writes the results to `out`: `trajectory.json` (trajectories at the controller's
+/// rate), `runs/run_k/` (each run is written completely or not at all; if trajectories are iterated one after the
+/// other, `leg_n/runs/run_k/`), `iterations.json` after every run, and `report.html` at the end. With `resume`, runs
+/// in the folder are not repeated. A call that continues after an interruption reaches the same result.
 ///
 /// # Errors
 /// Invalid files, study or settings, or files of another study's iteration in `out`. Failures of runs are reported in
@@ -56,7 +56,7 @@ pub fn iterate_study(
     iterated(Job { study: StudyFile::new(study, study_path), out, resume, options }, watch, None)
 }
 
-/// Like [`iterate_study`] with the caller's robot: `robot` receives the joint names and returns the robot.
+/// Like [`iterate_study`], with a robot of the caller: `robot` receives the joint names and returns the robot.
 ///
 /// # Errors
 /// As [`iterate_study`], and legs with locked joints, which only the simulator supports.
@@ -80,7 +80,7 @@ fn iterated(
     own_robot: Option<RobotMaker<'_>>,
 ) -> Result<IterationsFile, Error> {
     let Job { study, out, resume, options } = job;
-    // Permission is checked before any file is read or search starts.
+    // The permission is checked before any file is read and any search starts.
     let section = study.iteration.clone().unwrap_or_default();
     let program = permitted_program(&section, study.path, watch.programs)?;
     let begin = Instant::now();
@@ -120,7 +120,7 @@ fn iterated(
     Ok(file)
 }
 
-/// Opens the stores of all stages, each in its folder; without `resume` the results of an earlier call are removed.
+/// Opens the folders of all stages; without `resume` the results of an earlier call are removed.
 fn opened_stores(
     job: &Job<'_>,
     files: &ResultFiles<'_>,
@@ -130,12 +130,12 @@ fn opened_stores(
     let in_iteration = |error: IterationError| job.iteration_error(error);
     let folder =
         |stage: usize| if stages == 1 { job.out.to_owned() } else { job.out.join(format!("leg_{}", stage + 1)) };
-    // Results are removed before runs, and only if all folders may be reset.
+    // Results are removed before runs, and only if all folders can be reset.
     if !job.resume {
         (0..stages).try_for_each(|stage| IterationStore::may_begin_afresh(&folder(stage))).map_err(in_iteration)?;
         files.remove()?;
     }
-    // All stores are opened first, so that with --fresh no earlier run remains in any of them.
+    // All folders are opened first, so that with --fresh no earlier run remains in any of them.
     (0..stages)
         .map(|stage| IterationStore::open(&folder(stage), fingerprint, job.resume))
         .collect::<Result<Vec<_>, _>>()

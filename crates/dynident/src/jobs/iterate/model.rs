@@ -26,7 +26,7 @@ const PAGE: &str = "identification.html";
 /// Files written at the end of an iteration and removed at its start.
 const MODEL_FILES: [&str; 7] = [RESULT, URDF, TABLE, MJCF, SDF, CONTROLLER, PAGE];
 
-/// A finished iteration of legs that are identified together.
+/// A finished iteration of trajectories that are identified together.
 pub(super) struct EndedStage<'a> {
     pub(super) iteration: Iteration,
     pub(super) records: Vec<RunRecord>,
@@ -44,7 +44,7 @@ impl RobotFiles {
         Self { files: Vec::new(), base_parameters: Vec::new() }
     }
 
-    /// Adds these files to the set and removes the others. Without own files, those of another command remain.
+    /// Adds these files to the set and removes older ones. If there are no files, those of another command remain.
     pub(super) fn added_to(self, mut set: OutputSet, are_own: bool) -> OutputSet {
         if self.files.is_empty() && !are_own {
             return set;
@@ -79,7 +79,7 @@ pub(super) fn robot_found(
         };
         let legs = stage.iteration.task().legs.len();
         logs.extend(task.recordings.iter().enumerate().map(|(place, recording)| {
-            // The name is `run 3, leg 2`.
+            // The name has the form `run 3, leg 2`.
             let run = recording.name.split([' ', ',']).nth(1).and_then(|run| run.parse().ok()).unwrap_or(1);
             // Validation logs are last.
             match recording.role {

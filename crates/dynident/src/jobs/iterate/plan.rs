@@ -1,4 +1,4 @@
-//! Data that all stages of an iteration share: robot, legs, settings and report.
+//! Data that all stages of an iteration share: robot, trajectories, settings and report.
 
 use super::inputs::Inputs;
 use super::job::Job;
@@ -43,7 +43,7 @@ impl<'a> Plan<'a> {
         let data = options.data.as_deref();
         let report = IterationReport {
             study,
-            // Runs take hours, so files may change after they have been read and hashed.
+            // Runs take hours, so files could change after they were read and hashed.
             provenance: inputs.files.while_unchanged(|| motion_provenance(study, data, &[]))?,
             robot,
             duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
@@ -95,7 +95,8 @@ fn planner(job: &Job<'_>, inputs: &Inputs, legs: &[Leg]) -> Result<Option<Arc<dy
     Ok(Some(Arc::new(planner.map_err(|why| job.section_error(why.into()))?)))
 }
 
-/// Torque limit of each joint, Nm (N): stated for the simulated robot, otherwise from the robot description.
+/// Torque limit of each joint, Nm (N): the given limit of the simulated robot, otherwise that of the robot
+/// description.
 fn torque_limits(simulation: &SimulationSection, robot: &StudyRobot, simulated: bool) -> Option<Vec<f64>> {
     let dof = robot.model().dof();
     if let Some(stated) = simulation.limits.torque.as_ref().filter(|_| simulated) {

@@ -12,7 +12,7 @@ use dynident_iteration::{
 };
 use dynident_simulation::SensorSettings;
 
-/// The newest earlier run whose estimate is the controller's model.
+/// The newest earlier run whose estimate is the controller's model in this run.
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     let model = record.controller.model.as_ref()?;
     let with_model = |before: &&RunRecord| {
@@ -25,7 +25,7 @@ pub(super) struct IterationReport<'a> {
     pub(super) study: StudyFile<'a>,
     pub(super) provenance: Provenance,
     pub(super) robot: &'a StudyRobot,
-    /// Length of a run with all its legs, s.
+    /// Duration of a run with all its trajectories, s.
     pub(super) duration_s: f64,
     pub(super) truth: Option<Vec<f64>>,
     /// Cramér-Rao bound of a run with the first motion.
@@ -34,17 +34,17 @@ pub(super) struct IterationReport<'a> {
     pub(super) lowered: Vec<LoweredBandwidth>,
 }
 
-/// State of one iteration of legs that are identified together.
+/// State of one iteration of trajectories that are identified together.
 pub(super) struct Stage<'a> {
-    /// Leg number from 1, if each leg has a separate iteration.
+    /// Number of the trajectory from 1, if each trajectory has a separate iteration.
     pub(super) leg: Option<usize>,
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
     pub(super) shortfalls: &'a [UnmetCondition],
-    /// Forecast of a further run that was not worthwhile.
+    /// Forecast of a further run whose gain was too small.
     pub(super) declined: Option<&'a MotionForecast>,
-    /// Error bar of each base parameter from an earlier leg, if determined there.
+    /// Error bar of each base parameter from an earlier stage, if it was determined there.
     pub(super) known_std: &'a [Option<f64>],
 }
 
@@ -80,7 +80,7 @@ impl IterationReport<'_> {
         }
     }
 
-    /// Truth and bound of a stage; both are valid for the stated torque terms only.
+    /// True parameters and bound of a stage; both are valid only if the friction terms of the study are used.
     fn known(&self, stage: &Stage<'_>) -> Known<'_> {
         let is_stated = stage.robot.terms() == self.robot.terms();
         Known { truth: self.truth.as_deref().filter(|_| is_stated), bound: self.bound.as_deref().filter(|_| is_stated) }
@@ -145,7 +145,7 @@ struct Known<'a> {
     bound: Option<&'a [f64]>,
 }
 
-/// The base parameters of an estimate, with error bars of earlier legs where available.
+/// The base parameters of an estimate, with the error bars of earlier stages where these determined them.
 fn parameters(estimate: &RunEstimate, stage: &Stage<'_>, truth: Option<&[f64]>) -> Vec<IterationParameter> {
     let columns = stage.robot.layout().columns();
     let expressions = stage.robot.base().expressions();
@@ -188,7 +188,7 @@ fn run_forecast(forecast: &MotionForecast, reached_gain_percent: Option<f64>) ->
     }
 }
 
-/// The status, with the first unmet condition or the gain of a declined run.
+/// The status as text, with the first unmet condition or the gain of a run that was not made.
 fn in_words(status: &IterationStatus, shortfalls: &[UnmetCondition], declined: Option<&MotionForecast>) -> String {
     if let Some(forecast) = declined {
         return format!(
@@ -205,7 +205,8 @@ fn in_words(status: &IterationStatus, shortfalls: &[UnmetCondition], declined: O
     }
 }
 
-/// Missing runs are not reported if something else ended the iteration, because more runs would not help.
+/// A too small number of runs is not reported if something else ended the iteration, because more runs would not
+/// help.
 fn is_irrelevant(shortfall: &UnmetCondition, status: &IterationStatus) -> bool {
     let ended = matches!(
         status,
@@ -219,7 +220,7 @@ fn unmet(shortfall: &UnmetCondition) -> UnmetConditionEntry {
     UnmetConditionEntry { shortfall: shortfall.clone(), message, remedy }
 }
 
-/// Merges sequential iterations of legs: converged if all are, with the status of the last.
+/// Merges the iterations of several trajectories: converged if all have converged, with the status of the last.
 pub(super) fn merged(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);

@@ -33,10 +33,10 @@ pub(super) struct Stages<'a> {
 pub(super) struct StageResults<'a> {
     pub(super) files: Vec<IterationsFile>,
     pub(super) traces: Vec<RunTrace>,
-    /// Number of new runs, without those from earlier calls.
+    /// Number of new runs, without runs of earlier calls.
     pub(super) runs_made: usize,
     pub(super) ended: Vec<EndedStage<'a>>,
-    /// Error bar of each base parameter, if a stage has determined it.
+    /// Error bar of each base parameter that a stage has determined.
     known_std: Vec<Option<f64>>,
     /// Base parameters that are fixed in later stages: column and value.
     known: Vec<(usize, f64)>,
@@ -45,7 +45,7 @@ pub(super) struct StageResults<'a> {
 #[derive(Clone, Copy)]
 struct CurrentStage<'a> {
     iteration: &'a Iteration,
-    /// Leg number from 1, if each leg has a separate iteration.
+    /// Number of the trajectory from 1, if each trajectory has a separate iteration.
     leg: Option<usize>,
     legs: usize,
     store: &'a IterationStore,
@@ -179,7 +179,7 @@ impl StageResults<'_> {
         }
     }
 
-    /// Fixes parameters that this estimate determined first.
+    /// Fixes the parameters that this estimate is the first to determine.
     fn fix_parameters(&mut self, estimate: &RunEstimate) {
         let determined = self.known_std.len().min(estimate.values.len());
         for column in (0..determined).filter(|column| !estimate.fixed.contains(column)) {

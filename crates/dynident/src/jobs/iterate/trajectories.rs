@@ -1,4 +1,4 @@
-//! Trajectories of all legs, stored between calls.
+//! Trajectories of an iteration, stored between calls.
 
 use super::inputs::Inputs;
 use super::job::Job;
@@ -43,7 +43,7 @@ impl Trajectories {
     }
 }
 
-/// Trajectories of an earlier call, or new ones, which are stored before the first run.
+/// Returns the trajectories of an earlier call, or new ones, which are stored before the first run.
 pub(super) fn load_or_make(
     path: &Path,
     fingerprint: &str,

@@ -31,9 +31,9 @@ pub(crate) struct Trajectory {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StrokeSpan {
     pub(crate) joint: usize,
-    /// Start, s.
+    /// Start of the motion, s.
     pub(crate) from_s: f64,
-    /// End, s.
+    /// End of the motion, s.
     pub(crate) to_s: f64,
 }
 
@@ -106,7 +106,8 @@ impl Trajectory {
         Reference::new(self.rate_hz, motion)
     }
 
-    /// The part with the strokes of joints that are not held; the whole trajectory without strokes.
+    /// The part of the motion in which joints move that are not held; the whole trajectory if joints do not move one
+    /// after another.
     pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, StudyError> {
         if self.strokes.is_empty() || held.iter().all(Option::is_none) {
             return Ok(self.clone());

@@ -26,12 +26,12 @@ pub struct IterationWatch<'a> {
     pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
     /// Whether the program of the study's robot may be started; by default not.
     pub programs: ProgramPermission<'a>,
-    /// Observes the motions while they run; by default nobody does.
+    /// Observes the motions while they run; no observer by default.
     pub observer: Option<&'a dyn MotionObserver>,
 }
 
 impl<'a> IterationWatch<'a> {
-    /// Callbacks only: no stop, all motions permitted, no program is started.
+    /// Creates a watch with callbacks only: no stop, all motions permitted, no program is started.
     pub fn new(
         design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
         run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),

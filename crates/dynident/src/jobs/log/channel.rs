@@ -1,4 +1,4 @@
-//! Statistics of one channel: range, count, course.
+//! Statistics of one channel: range, number of values, averaged course over time.
 
 /// Maximum number of averaged parts of the course; must be even.
 const MAX_PARTS: usize = 48;
@@ -10,7 +10,7 @@ pub(super) struct ChannelStatistics {
     first: Option<f64>,
     last: Option<f64>,
     rows: u64,
-    /// Rows per part: a power of two that doubles when all parts are full.
+    /// Number of rows per part: a power of two that doubles when all parts are full.
     rows_of_part: u64,
     parts: Vec<(f64, u64)>,
 }

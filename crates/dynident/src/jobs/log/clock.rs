@@ -1,12 +1,13 @@
-//! Sample rate of a group from its time stamps.
+//! Sampling rate of a group of columns, from its time stamps.
 
-/// Number of mean steps above which a step is a gap: a pause, or the end of an episode.
+/// A step longer than this number of mean steps is a gap: a pause, or the end of an episode.
 const MIN_GAP_STEPS: f64 = 5.0;
-/// Steps before the mean is reliable.
+/// Number of steps before the mean is reliable.
 const MIN_STEPS_FOR_MEAN: u64 = 8;
 
-/// Largest standard deviation of the steps, relative to their mean, of a column without a name that is a clock. Stamps
-/// of recorders that are not real-time scatter by up to 0.3 steps; positions of a moving joint scatter more.
+/// A column without a name can be a clock if the standard deviation of its steps, relative to their mean, is at most
+/// this. Stamps of recorders that are not real-time scatter by up to 0.3 steps; positions of a moving joint scatter
+/// more.
 const MAX_STEP_DEVIATION: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,12 +16,12 @@ pub(super) struct Clock {
     steps: u64,
     sum: f64,
     gaps: u64,
-    /// Mean step, and sum of the squared deviations from it (Welford).
+    /// Mean step; the field below is the sum of squared deviations from it (Welford).
     mean: f64,
     squares: f64,
     /// Whether a step was not positive or a value is missing.
     falls: bool,
-    /// Whether a step is not one; otherwise the column counts the rows.
+    /// Whether a step differs from one; otherwise the column counts the rows.
     other_than_one: bool,
 }
 
@@ -46,8 +47,8 @@ impl Clock {
         }
     }
 
-    /// Standard deviation of the steps relative to their mean, if this column rises so evenly that it can be a clock. A
-    /// counter of rows is no clock.
+    /// Standard deviation of the steps relative to their mean, if this column increases so evenly that it can be a
+    /// clock. A counter of rows is not a clock.
     pub(super) fn step_deviation(&self) -> Option<f64> {
         let variance = self.squares / self.steps as f64;
         let deviation = variance.max(0.0).sqrt() / self.mean;

@@ -13,12 +13,14 @@ use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
 use std::path::Path;
 
-/// Units of time stamps, s; the first plausible one is taken where the name states none. Excel and MATLAB count days.
+/// Units of time stamps, s. If the name contains no unit, the first plausible one is used. Excel and MATLAB count
+/// days.
 const TIME_UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0)];
-/// Sample rates of robot logs, Hz: slower logs contain no acceleration, faster ones do not exist.
+/// Plausible sampling rates of robot logs, Hz: slower logs contain no acceleration, and faster logs do not exist.
 const MIN_RATE_HZ: f64 = 2.0;
 const MAX_RATE_HZ: f64 = 2e4;
-/// Smallest number of rows whose rate shows the unit, or whose values show the clock: a list of events has no rate.
+/// Minimum number of rows from which a unit (by the rate) or the clock (by the values) is recognised: a list of
+/// events has no rate.
 const MIN_ROWS_OF_CLOCK: u64 = 50;
 
 /// Reads a recording of any format once and summarises its contents, with constant memory.
@@ -34,7 +36,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let log = FileLog::described_by_itself(path);
     let (format, mut table) = log.open_with_format()?;
     let names = column_names(table.as_ref());
-    // With the units that the file states separately from the names.
+    // Names with the units that the file contains separately.
     let described: Vec<_> =
         names.iter().enumerate().map(|(column, name)| with_unit(name, table.unit(column)).into_owned()).collect();
     let groups = table.groups();
@@ -95,13 +97,13 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     Ok(found)
 }
 
-/// The time unit, s, with which a clock of `rate` rows per unit records a robot.
+/// The time unit, s, in which a clock with `rate` rows per unit gives a plausible rate for a robot.
 fn unit_of_rate(rate: f64) -> Option<f64> {
     let is_of_robot = |unit_s: f64| (MIN_RATE_HZ..=MAX_RATE_HZ).contains(&(rate / unit_s));
     TIME_UNITS.iter().map(|(_, unit_s)| *unit_s).find(|unit_s| is_of_robot(*unit_s))
 }
 
-/// Names of the columns in a study: their names, or their 0-based indices.
+/// Names of the columns for a study: their names, or their 0-based indices.
 fn column_names(table: &dyn LogTable) -> Vec<String> {
     match table.names() {
         Some(names) => names.to_vec(),
@@ -118,7 +120,7 @@ fn bytes(path: &Path) -> Result<u64, RecordingError> {
     Ok(bytes)
 }
 
-/// The time column within a group, and its unit in seconds.
+/// The time column of a group, and its unit in seconds.
 fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     match group.time {
         Some(column) => Some((column - group.columns.start, 1.0)),
@@ -129,7 +131,7 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
 struct GroupStatistics {
     rows: u64,
     channels: Vec<ChannelStatistics>,
-    /// One for each column; only that of the time column is used if its name is known.
+    /// One clock for each column. If the name of the time column is known, only its clock is used.
     clocks: Vec<Clock>,
 }
 
@@ -138,7 +140,7 @@ impl GroupStatistics {
         Self { rows: 0, channels: vec![ChannelStatistics::default(); columns], clocks: vec![Clock::default(); columns] }
     }
 
-    /// The column that rises most evenly, as a clock does.
+    /// The column that increases most evenly, like a clock.
     fn time_by_values(&self) -> Option<usize> {
         if self.rows < MIN_ROWS_OF_CLOCK {
             return None;
@@ -151,7 +153,7 @@ impl GroupStatistics {
         deviations.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(column, _)| column)
     }
 
-    /// Adds a row; column `time` contains the time. Without it, every column may.
+    /// Adds a row; column `time` contains the time. If `time` is `None`, every column can be the time.
     fn add(&mut self, row: &[f64], time: Option<usize>) {
         self.rows += 1;
         self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));

@@ -9,7 +9,7 @@ use core::fmt::Write;
 use dynident_text::quoted;
 use std::path::Path;
 
-/// A draft of a study's `[format]` from column names only, without knowledge of the robot.
+/// A draft of a study's `[format]` from the names of columns alone, without information about the robot.
 pub(super) fn study_format(found: &LogContents) -> String {
     if !found.has_episodes() {
         return of_recording(found, "");

@@ -4,10 +4,10 @@ use crate::jobs::columns::{Basis, Family, JointKey, words};
 use crate::result::LogContents;
 use std::path::Path;
 
-/// Parts of the names of joints that are often logged as a share of their range.
+/// Parts of the names of joints that are often logged as a percentage or share of their range.
 pub(super) const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
 
-/// Joint of each column, and whether the assignment is certain.
+/// The joint of each column, and whether the assignment is certain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LoggedJoints {
     /// Joint indices in the order of the columns.
@@ -16,21 +16,21 @@ pub(super) struct LoggedJoints {
     pub(super) is_sure: bool,
 }
 
-/// The joints of a robot that columns can belong to.
+/// The joints of a robot to which columns can belong.
 #[derive(Clone, Debug)]
 pub(super) struct RobotJoints<'a> {
     /// Names of all joints.
     pub(super) names: &'a [String],
     /// Indices of the joints that do not follow others.
     pub(super) free: Vec<usize>,
-    /// Indices of the revolute ones among them.
+    /// Indices of the revolute joints among them.
     pub(super) turning: Vec<usize>,
-    /// The joints that carry each joint.
+    /// For each joint, the joints that carry it.
     pub(super) carriers: Vec<Vec<usize>>,
 }
 
 impl RobotJoints<'_> {
-    /// A joint that carries one of `joints` and is not among them, although it moves independently.
+    /// Name of a joint that carries one of `joints` and is missing in the list although it moves independently.
     fn missing_below(&self, joints: &[usize]) -> Option<&str> {
         let mut below = joints.iter().filter_map(|joint| self.carriers.get(*joint)).flatten();
         below.find(|joint| self.free.contains(joint) && !joints.contains(joint)).map(|joint| &self.names[*joint][..])
@@ -38,7 +38,7 @@ impl RobotJoints<'_> {
 }
 
 /// Assigns the columns of `family` to the joints: by the names of joints, then by numbers, then in order. `left_out`
-/// are joint names of further columns of the same kind. `None` if there are more columns than joints.
+/// contains the joint names of further columns of the same kind. `None` if there are more columns than joints.
 pub(super) fn logged_joints(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Option<LoggedJoints> {
     let found = assigned(family, robot, left_out)?;
     let Some(missing) = robot.missing_below(&found.joints).filter(|_| found.is_sure) else { return Some(found) };
@@ -114,9 +114,9 @@ fn assigned(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Op
     Some(LoggedJoints { joints, reason: format!("{reason}{unnamed}"), is_sure: unnamed.is_empty() })
 }
 
-/// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`;
-/// otherwise whose words begin those of the joint: `w1` and `wrist_1_joint`. `None` if a name has no joint or several,
-/// or two names have one.
+/// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`.
+/// Otherwise the joint whose words begin with those of the name: `w1` and `wrist_1_joint`. `None` if a name matches
+/// no joint or several, or if two names match the same joint.
 fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
     let of_joints: Vec<Vec<String>> = robot.names.iter().map(|name| words(&name.to_lowercase())).collect();
     let contains = |all: &[String], part: &[String], is_like: fn(&String, &String) -> bool| {
@@ -145,7 +145,8 @@ fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
     })
 }
 
-/// The rank of each name by its last number, for names that differ in it alone: `j_1, j_2, j_0` gives 1, 2, 0.
+/// The rank of each name by its last number, for names that differ only in this number: `j_1, j_2, j_0` gives 1, 2,
+/// 0.
 fn by_numbers(names: &[&str]) -> Option<Vec<usize>> {
     let split = |name: &&str| {
         let words = words(name);
@@ -162,8 +163,8 @@ fn by_numbers(names: &[&str]) -> Option<Vec<usize>> {
     if numbers.len() == names.len() { ranks.collect() } else { None }
 }
 
-/// Joins families in which the log has a column for each of the free joints, but less than half of the names are those
-/// of joints: `Wrist_Roll` next to `Jaw`. Their columns are then foreign names in the order of the file.
+/// Joins families if the log has a column for each of the free joints, but fewer than half of the names are joint
+/// names: `Wrist_Roll` next to `Jaw`. Their columns are then treated as unknown names in the order of the file.
 pub(super) fn with_partly_foreign_names(
     all: &[Family],
     logs: &[(&Path, LogContents)],
@@ -186,7 +187,7 @@ pub(super) fn with_partly_foreign_names(
             joined.push(family.clone());
             continue;
         };
-        // Both are joined when the foreign family is met.
+        // Both families are joined when the one with unknown names is processed.
         if is_named(family) {
             continue;
         }
@@ -202,7 +203,7 @@ pub(super) fn with_partly_foreign_names(
     joined
 }
 
-/// Joins columns with names and with numbered names, `q_elbow` next to `q_w1`, if together the log has a column for
+/// Joins columns with names and with numbered names, `q_elbow` next to `q_w1`, if together they have a column for
 /// each of the free joints.
 pub(super) fn with_numbered_names(
     all: &[Family],
@@ -210,7 +211,7 @@ pub(super) fn with_numbered_names(
     robot: &RobotJoints<'_>,
 ) -> Vec<Family> {
     let kind = |family: &Family| (family.file, family.group, family.quantity);
-    // The words of a numbered name that the other name lacks, if it has all of the other's.
+    // The words that a numbered name has in addition to the other name, if it contains all words of the other.
     let further = |numbered: &Family, named: &Family| {
         let of = |family: &Family| family.stem.split('_').map(str::to_owned).collect::<Vec<String>>();
         let (all, part) = (of(numbered), of(named));
@@ -247,7 +248,7 @@ pub(super) fn with_numbered_names(
     joined
 }
 
-/// Leaves out the columns of grippers where the robot description has fewer joints than the log, and no such joint.
+/// Omits the columns of grippers if the robot description has fewer joints than the log, and no gripper joint.
 pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
     let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if GRIPPERS.iter().any(|gripper| name.contains(gripper)));
     let mut all = all.to_vec();
@@ -259,8 +260,8 @@ pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) 
     all
 }
 
-/// The columns of `family` in the order of `joints`: by joint, by number, or by the place of their numbers, `tau1` of
-/// `q0`. `None` if one is missing.
+/// The columns of `family` in the order of `joints`: by joint, by number, or by the rank of their numbers (`tau1`
+/// belongs to `q0`). `None` if a column is missing.
 pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<String>> {
     let name_at = |place: usize, joint: usize| {
         let by_name = family.columns.iter().find(|(key, _)| *key == JointKey::Joint(joint));
@@ -281,8 +282,8 @@ pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Op
     })
 }
 
-/// Whether the columns of `family` have numbers and those of `logged` the names of joints, so that the order of the
-/// numbers is assumed.
+/// Whether the columns of `family` have numbers and those of `logged` have joint names, so that the order of the
+/// numbers is an assumption.
 pub(super) fn is_numbered_next_to_names(family: &Family, logged: &Family) -> bool {
     let is_number = |family: &Family| matches!(family.columns[0].0, JointKey::Number(_));
     is_number(family) && !is_number(logged)

@@ -1,4 +1,4 @@
-//! Draft of a study: tables and keys with reasons.
+//! Draft of a study: tables and keys, each with its reason.
 
 use crate::jobs::check::REPEATED_VALUES;
 use crate::result::{CheckFinding, StudyChange, StudyCheck, Unsure};
@@ -17,7 +17,7 @@ pub(super) struct Line {
 /// A table, or one entry of an array of tables.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Table {
-    /// In brackets: `[robot]`, `[[log]]`; empty for the top level.
+    /// Heading in brackets: `[robot]`, `[[log]]`; empty for the top level.
     heading: String,
     reason: String,
     lines: Vec<Line>,
@@ -64,7 +64,7 @@ impl Draft {
         Self { tables }
     }
 
-    /// Applies a proposed change; returns false if it is not a key or its table is missing.
+    /// Applies a proposed change; returns false if the change is not a key or its table is missing.
     pub(super) fn apply(&mut self, change: &StudyChange, reason: &str) -> bool {
         let Some((key, value)) = change.line.split_once('=') else { return false };
         let (key, value) = (key.trim(), value.trim());
@@ -82,9 +82,10 @@ impl Draft {
         true
     }
 
-    /// Applies unambiguous corrections of an examination; returns whether anything changed. Signs, orders, mountings
-    /// and units have few possible values, and the rows that a recorder repeats are counted. A zero or a factor has any
-    /// value and may compensate for another mistake, so a person decides.
+    /// Applies the unambiguous corrections of an examination; returns whether anything changed. Signs, orders,
+    /// mountings and units have few possible values, and the number of rows that a recorder repeats can be counted. A
+    /// zero position or a factor can have any value and may compensate for another mistake, so a person has to
+    /// decide.
     pub(super) fn apply_corrections(&mut self, found: &StudyCheck) -> bool {
         let is_discrete = |finding: &&CheckFinding| match finding.kind.as_str() {
             "sign" | "order" | "mounting" => true,
@@ -143,7 +144,7 @@ impl Draft {
                 let _ = writeln!(text, "{key} = {value}");
             }
         }
-        // Values have several sources, all of which write TOML.
+        // The values come from several sources, all of which write TOML.
         toml_document(&text).into_owned()
     }
 }

@@ -7,8 +7,8 @@ use crate::jobs::identify::identify;
 use crate::jobs::options::RunOptions;
 use core::fmt::Write;
 
-/// Result of the test for drive inertia: the table `[drive]` if the logs show it, for commands without logs; otherwise
-/// a comment with the estimates.
+/// Result of the test for drive inertia: the table `[drive]` if the logs show drive inertia, for commands without
+/// logs; otherwise a comment with the estimates.
 pub(super) enum DriveInertiaFinding {
     /// Table for the study.
     Present(Table),
@@ -16,7 +16,8 @@ pub(super) enum DriveInertiaFinding {
     Absent(String),
 }
 
-/// Runs [`identify()`] with simple friction, because the selection of friction takes longer and is independent.
+/// Runs [`identify()`] with simple friction, because the selection of friction takes longer and does not change the
+/// result of this test.
 ///
 /// # Errors
 /// Those of [`identify()`].

@@ -41,7 +41,7 @@ pub struct NewStudy {
     pub out: PathBuf,
     /// Sample rate for recordings without time stamps, Hz.
     pub rate_hz: Option<f64>,
-    /// Lines that a person states; these override proposals and answer [`NewStudyFile::unsure`].
+    /// Lines that a person has decided; these override proposals and answer [`NewStudyFile::unsure`].
     pub stated: Vec<StudyChange>,
 }
 
@@ -53,10 +53,10 @@ impl NewStudy {
     }
 }
 
-/// Writes a study: joints from names and number of columns, units from names, limits and ranges, and a validation part.
-/// It is then examined like by [`check`], unambiguous corrections are applied, and one fit tests for drive inertia,
-/// which `design` and `iterate` need but cannot test. Every line has a reason; uncertain lines are marked. No file is
-/// written.
+/// Writes a study: joints from names and number of columns, units from names, limits and ranges, and a part for
+/// validation. The study is then examined like by [`check`], and unambiguous corrections are applied. One fit tests
+/// for drive inertia, which `design` and `iterate` need but cannot test. Every line has a reason; uncertain lines are
+/// marked. No file is written.
 ///
 /// # Errors
 /// A robot description or recording that cannot be read, or without recognisable columns of positions and of torques or
@@ -65,7 +65,7 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     new_study_with(request, options, &NewStudySettings::default())
 }
 
-/// As [`new_study()`], with other thresholds.
+/// Like [`new_study()`], with other thresholds.
 ///
 /// # Errors
 /// As [`new_study()`], and invalid thresholds.
@@ -79,7 +79,7 @@ pub fn new_study_with(
         Some(robot) => (**robot).clone(),
         None => load_robot(&request.robot, &LoadSettings { xacro: request.xacro.clone(), ..LoadSettings::default() })?,
     };
-    // Each episode of a file is a recording.
+    // Each episode of a file is a separate recording.
     let (mut logs, mut parts) = (Vec::new(), Vec::new());
     for path in &request.logs {
         for (part, contents) in log_contents(path)?.episodes() {
@@ -104,7 +104,7 @@ pub fn new_study_with(
             let found = match check(&study, &request.out, options) {
                 Ok(found) => found.check,
                 Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // The study is known except for what the error names, so it is written.
+                // Except for the part that the error names, the study is known, so it is written.
                 Err(error) => {
                     unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
                     break;

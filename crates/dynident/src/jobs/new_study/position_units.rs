@@ -1,4 +1,5 @@
-//! Units of positions and commands whose names state none, and grippers that are logged as a share of their range.
+//! Units of positions and commands whose names contain no unit, and grippers that are logged as a share of their
+//! range.
 
 use super::channels::GRIPPERS;
 use super::draft::Table;
@@ -11,16 +12,16 @@ use std::path::Path;
 
 /// Logged position of an open gripper, if it is logged as a share of its range: 1, or 100 for percent.
 const FULL_RANGES: [f64; 2] = [1.0, 100.0];
-/// Part of the full range by which a logged share may exceed it.
+/// Largest amount by which a logged share can exceed the full range, as a part of the full range.
 const MAX_EXCESS: f64 = 0.1;
 
 /// A gripper that is logged as a share of its range.
 struct Gripper {
-    /// Place among the columns.
+    /// Index of its column.
     place: usize,
-    /// Its full range in the log: 1 or 100.
+    /// Value of the full range in the log: 1 or 100.
     full: f64,
-    /// Its limits, rad or m.
+    /// Position limits, rad or m.
     limits: [f64; 2],
 }
 
@@ -28,7 +29,7 @@ struct Gripper {
 pub(super) struct PositionUnits {
     columns: usize,
     gripper: Option<Gripper>,
-    /// Largest position of a revolute joint that is implausible in radians.
+    /// Largest position of a revolute joint, if it is implausible in radians.
     implausible: Option<f64>,
     /// For each column, the largest position of a prismatic joint.
     travel: Vec<Option<f64>>,
@@ -43,7 +44,7 @@ impl PositionUnits {
             let channel = logs[file].1.channels.iter().find(|channel| channel.name == *name)?;
             channel.range
         };
-        // A command log has the same unit in both quantities.
+        // In a log of commands, positions and commands have the same unit.
         let ranges = |place: usize| {
             let is_alone = recognised.drive.file != recognised.position.file || !recognised.has_commands();
             let files = if is_alone { &[recognised.position.file][..] } else { &recognised.files[..] };
@@ -102,7 +103,7 @@ impl PositionUnits {
         stated == Some("deg") || stated.is_none() && self.implausible.is_some()
     }
 
-    /// Unit of a column of `family`, and the reason for a doubt.
+    /// Unit of a column of `family`, and the reason if it is uncertain.
     fn unit(&self, place: usize, stated: Option<&'static str>) -> (&'static str, Option<String>) {
         match (stated, self.travel[place]) {
             (Some(unit @ ("m" | "mm")), _) | (Some(unit), None) => (unit, None),
@@ -119,7 +120,7 @@ impl PositionUnits {
         }
     }
 
-    /// `table` with the unit of its `columns`, and the range of a gripper.
+    /// Returns `table` with the unit of its `columns`, and the range of a gripper.
     pub(super) fn with_unit(&self, table: Table, family: &Family, columns: &[String]) -> Table {
         let stated = family.unit;
         let units: Vec<_> =

@@ -1,11 +1,11 @@
-//! Reasons of a study's lines, and what was recognised in its recordings.
+//! Reasons for a study's lines, and what was recognised in its recordings.
 
 use crate::error::RecognisedFile;
 use crate::jobs::columns::{Basis, Family, Quantity, Source, shown};
 use crate::result::LogContents;
 use std::path::Path;
 
-/// Maximum number of other choices in a reason.
+/// Maximum number of alternatives in a reason.
 const MAX_ALTERNATIVES: usize = 4;
 /// Maximum number of kinds of columns of one file in a message.
 const MAX_KINDS: usize = 12;
@@ -31,7 +31,7 @@ fn source_name(source: Source) -> &'static str {
     }
 }
 
-/// The columns that could be taken instead of `chosen`, as the end of a reason.
+/// The columns that could be used instead of `chosen`, as the end of a reason.
 pub(super) fn alternatives<'a>(chosen: &Family, all: impl Iterator<Item = &'a Family>) -> String {
     let is_effort = |quantity| matches!(quantity, Quantity::Torque | Quantity::Current);
     let is_like = |family: &&Family| {
@@ -47,7 +47,7 @@ pub(super) fn alternatives<'a>(chosen: &Family, all: impl Iterator<Item = &'a Fa
     if others.is_empty() { String::new() } else { format!("; not used: {}", others.join(", ")) }
 }
 
-/// What was recognised in each recording, for a message: unknown columns first.
+/// What was recognised in each recording, for a message; unknown columns come first.
 pub(super) fn recognised(all: &[Family], logs: &[(&Path, LogContents)]) -> Vec<RecognisedFile> {
     let of_file = |(file, (path, log)): (usize, &(&Path, LogContents))| {
         let own = || all.iter().filter(move |family| family.file == file).flat_map(|family| &family.columns);

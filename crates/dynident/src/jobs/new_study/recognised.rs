@@ -1,4 +1,4 @@
-//! The columns of a study among those of its recordings.
+//! The columns that a study uses, among all columns of its recordings.
 
 use super::channels::{
     LoggedJoints, RobotJoints, in_order, logged_joints, with_numbered_names, with_partly_foreign_names,
@@ -16,7 +16,7 @@ use crate::result::{LogContents, Unsure};
 use dynident_model::{JointKind, Model};
 use std::path::Path;
 
-/// The columns of a study among those of its recordings.
+/// The columns that a study uses, among all columns of its recordings.
 pub(super) struct RecognisedColumns {
     pub(super) thresholds: NewStudySettings,
     /// Joint assignment, in the order of the columns.
@@ -27,33 +27,33 @@ pub(super) struct RecognisedColumns {
     pub(super) velocity: Option<Family>,
     pub(super) columns: [Vec<String>; 2],
     pub(super) velocity_columns: Option<Vec<String>>,
-    /// Recordings with these columns; recordings with torques only belong to one of them.
+    /// Indices of the recordings with these columns; a recording with torques only belongs to one of them.
     pub(super) files: Vec<usize>,
-    /// The episode of each recording, for files with several.
+    /// The episode of each recording, for files with several episodes.
     pub(super) parts: Vec<Option<String>>,
     pub(super) time: Option<LogClock>,
-    /// Other columns of the quantities of positions, velocities and torques.
+    /// Other columns that contain positions, velocities or torques.
     pub(super) alternatives: [String; 3],
-    /// Columns of positions and of torques that are as likely as the chosen ones.
+    /// Columns of positions and of torques that are as likely as the selected ones.
     pub(super) equals: [Option<String>; 2],
-    /// Rows of the recordings for one row with values in all columns.
+    /// Number of rows per row with values in all columns.
     pub(super) rows_of_complete_one: f64,
 }
 
 /// The clock of the recordings.
 pub(super) struct LogClock {
-    /// The value of `time`.
+    /// The value of the key `time`.
     pub(super) key: String,
-    /// Mean rate, Hz.
+    /// Mean sampling rate, Hz.
     pub(super) rate_hz: Option<f64>,
-    /// Whether its name, not its values, shows that it is the clock.
+    /// Whether the name of the column, and not only its values, shows that it is the clock.
     pub(super) is_named: bool,
-    /// Whether the stamps are 0, 1, 2, .. without a unit.
+    /// Whether the time stamps are 0, 1, 2, .. without a unit.
     pub(super) counts: bool,
 }
 
 impl RecognisedColumns {
-    /// The columns of `logs` for the joints of `model`.
+    /// Finds the columns of `logs` for the joints of `model`.
     ///
     /// # Errors
     /// No columns of positions, or of torques or commands.
@@ -80,7 +80,7 @@ impl RecognisedColumns {
         let mut all = without_foreign_grippers(&joined, &robot);
         let missing =
             |quantity, all: &[Family]| NewStudyError::NotRecognised { quantity, found: recognised(all, logs) };
-        // Unknown columns, one for each joint.
+        // Columns with unknown names, one for each joint.
         let assume = |all: &mut Vec<Family>, quantity| {
             let known: Vec<String> =
                 all.iter().flat_map(|family| &family.columns).map(|(_, name)| name.clone()).collect();
@@ -113,7 +113,8 @@ impl RecognisedColumns {
         })?;
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 
-        // In the file of the positions if present, otherwise in another file with the same number of rows.
+        // The columns are searched in the file of the positions, and otherwise in another file with the same number
+        // of rows.
         let in_same_file = |family: &Family| family.file == position.file && ordered(family).is_some();
         let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
         let in_other_file = |family: &Family| {
@@ -212,7 +213,7 @@ impl RecognisedColumns {
         unused.map(|(_, (path, _))| Unsure { line: None, proposed: Vec::new(), reason: reason(path) }).collect()
     }
 
-    /// Whether the log has commanded positions in place of torques.
+    /// Whether the log has commanded positions instead of torques.
     pub(super) fn has_commands(&self) -> bool {
         self.drive.quantity == Quantity::Position
     }

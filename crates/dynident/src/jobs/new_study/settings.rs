@@ -5,14 +5,14 @@ use crate::error::{Expected, StudyError};
 /// Thresholds of [`new_study_with`](crate::new_study_with).
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewStudySettings {
-    /// Part of a single recording for training, as fractions of its rows. Default 0 to 0.65.
+    /// Part of a single recording that is used for training, as fractions of its rows. Default 0 to 0.65.
     pub training_fraction: [f64; 2],
-    /// Part of a single recording for validation, as fractions of its rows. Default 0.7 to 1: the gap after the
-    /// training part separates correlated samples.
+    /// Part of a single recording that is used for validation, as fractions of its rows. Default 0.7 to 1: the gap
+    /// after the training part separates correlated samples.
     pub validation_fraction: [f64; 2],
-    /// Largest position that is assumed to be in radians, turns. Default 4.
+    /// Largest position, in turns, that is assumed to be in radians. Default 4.
     pub max_radian_turns: f64,
-    /// Largest position of a prismatic joint that is assumed to be in metres, m. Default 10.
+    /// Largest position of a prismatic joint, in m, that is assumed to be in metres. Default 10.
     pub max_travel_m: f64,
 }
 

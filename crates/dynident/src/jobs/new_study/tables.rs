@@ -14,7 +14,7 @@ use dynident_text::quoted;
 use std::path::Path;
 
 impl RecognisedColumns {
-    /// The study with its reasons.
+    /// The study with the reasons for its lines.
     pub(super) fn draft(&self, request: &NewStudy, model: &Model, logs: &[(&Path, LogContents)]) -> Draft {
         let from = request.out.parent().unwrap_or_else(|| Path::new(""));
         let joints = model.joints();
@@ -104,7 +104,7 @@ impl RecognisedColumns {
         table.with_unsure("keep_every", format!("{every}"), reason)
     }
 
-    /// The doubt about a choice between columns.
+    /// The reason why a choice between columns is uncertain.
     fn doubt(&self, place: usize) -> Option<String> {
         let equal = self.equals[place].as_ref()?;
         Some(format!("{equal} may equally be meant: the names do not decide, the first in the file are taken"))
@@ -121,7 +121,7 @@ impl RecognisedColumns {
     }
 
     fn velocity_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
-        // Commands are compared with positions alone.
+        // Commands are compared with positions only, so velocities are not used.
         let velocity = self.velocity.as_ref().filter(|_| !self.has_commands());
         let (family, columns) = velocity.zip(self.velocity_columns.as_ref())?;
         let table = Table::new(
@@ -220,7 +220,7 @@ impl RecognisedColumns {
     }
 }
 
-/// The units in the names of `columns`, if one is not the usual one.
+/// The units in the names of `columns`, if one of them is not the usual unit.
 fn stated_units(family: &Family, columns: &[String], usual: &'static str) -> Option<String> {
     let units: Vec<&str> = columns.iter().map(|column| family.unit_of(column).unwrap_or(usual)).collect();
     units.iter().any(|unit| *unit != usual).then(|| one_or_list(&units))
@@ -230,7 +230,7 @@ fn key(name: &str) -> String {
     if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
 }
 
-/// `path` relative to `folder`, with `/`; unchanged if there is no relative path.
+/// `path` relative to `folder`, written with `/`; unchanged if there is no relative path.
 fn path_in_study(path: &Path, folder: &Path) -> String {
     let unchanged = || path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     relative_path(folder, path).unwrap_or_else(unchanged)

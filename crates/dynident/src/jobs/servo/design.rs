@@ -1,4 +1,5 @@
-//! `design` for drives with a position controller: commands that determine drives and bodies.
+//! `design` for drives with a position controller: position commands that determine the parameters of drives and
+//! bodies.
 
 use super::result::{DETERMINED, is_of_body};
 use super::{first_drives, training_runs};
@@ -37,8 +38,8 @@ pub struct ServoDesignOutcome {
 }
 
 impl ServoDesignOutcome {
-    /// `commands.csv`: time and the command of each joint, `t_s, c1, ..`, in s and rad (m), each command held until the
-    /// next. `[format] command = { columns = "c{1..n}", unit = "rad" }` reads it.
+    /// Text of `commands.csv`: time and the command of each joint, `t_s, c1, ..`, in s and rad (m). Each command is
+    /// held until the next. `[format] command = { columns = "c{1..n}", unit = "rad" }` reads this file.
     pub fn csv(&self) -> String {
         let mut text = String::from("t_s");
         for joint in 1..=self.commands.len() {
@@ -56,9 +57,9 @@ impl ServoDesignOutcome {
     }
 }
 
-/// Designs commands for the drives of a study: the values of `[drive.servo]`, otherwise those of the responses in its
-/// training logs. The simulated motion keeps the limits of the robot description and of `[design]` (position, speed,
-/// places, self-collision), and does not touch the floor.
+/// Designs commands for the drives of a study. Drive values are those of `[drive.servo]`, otherwise those that follow
+/// from the responses in the training logs. The simulated motion keeps the limits of the robot description and of
+/// `[design]` (position, velocity, places, self-collision), and does not touch the floor.
 ///
 /// # Errors
 /// Study, robot and logs that cannot be read; drives without values; joints without range; no permitted motion.
@@ -84,7 +85,7 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoDes
     let provenance = motion_provenance(study, options.data.as_deref(), &[])?;
     let settings = &section.design;
     let check = |positions: &[Vec<f64>]| reports(&limits, model, positions, settings.rate_hz);
-    // Errors of the limits are the same for all motions.
+    // Errors in the limits are the same for all motions, so they are reported before the search.
     check(&start.iter().map(|q| vec![*q; 2]).collect::<Vec<_>>())
         .map_err(Error::section(study.path, "design.limits"))?;
     let is_permitted = |positions: &[Vec<f64>]| {
@@ -94,7 +95,7 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoDes
     let parameters = unknowns(&servos, &section.fit);
     options.progress.begin("design of commands", Some(settings.evaluations() as u64));
     let advance = |count| options.progress.advance(count);
-    // Checks of limits run here, simulations on the threads.
+    // The checks of limits run on this thread, simulations on the pool of threads.
     let found = crate::jobs::servo::on_threads(options.threads, || {
         let bounds = (&ranges[..], &start[..]);
         design_commands(&servos, &parameters, bounds, (&section.fit, settings), &is_permitted, &advance)
@@ -147,14 +148,14 @@ fn ranges(model: &Model, limits: &Limits, section: &ServoSection) -> Result<Vec<
                 "correct one of them",
             ));
         }
-        // Without a limit, commands take a second for the range.
+        // Without a velocity limit, commands take one second for the range.
         let speed = limit.and_then(|limit| limit.speed).unwrap_or(greatest - least);
         Ok(CommandRange { least, greatest, speed })
     };
     model.joints().iter().enumerate().map(of_joint).collect()
 }
 
-/// The posture at the beginning and end: that of the study, otherwise the middle of the ranges.
+/// The posture at the beginning and at the end: that of the study, otherwise the middle of the ranges.
 fn start(study: StudyFile<'_>, model: &Model, ranges: &[CommandRange]) -> Result<Vec<f64>, StudyError> {
     let stated = study.design.as_ref().and_then(|design| design.start_posture.as_ref());
     let stated = stated.map(|posture| posture.named("start_posture", model)).transpose()?.unwrap_or_default();
@@ -165,7 +166,8 @@ fn start(study: StudyFile<'_>, model: &Model, ranges: &[CommandRange]) -> Result
     Ok(ranges.iter().enumerate().map(of_joint).collect())
 }
 
-/// Use of each limit by positions of each joint at `rate_hz`, with velocities from differences.
+/// Ratio of value to limit for each limit, from the positions of each joint at `rate_hz`, with velocities by
+/// differences.
 fn reports(
     limits: &Limits,
     model: &Model,
@@ -250,7 +252,7 @@ fn expected(own: &ServoValue, chirp: &ServoValue, is_rotary: bool) -> ServoForec
     }
 }
 
-/// Geometric mean of the error bars divided by those of the chirp.
+/// Geometric mean of the ratios of these error bars to those of a chirp motion.
 fn ratio<'a>(pairs: impl Iterator<Item = (&'a ServoValue, &'a ServoValue)>) -> f64 {
     let logs: Vec<f64> = pairs
         .map(|(own, chirp)| own.std_at_scale / chirp.std_at_scale)

@@ -1,4 +1,4 @@
-//! The user's robot description with the found values.
+//! The user's robot description with the identified values.
 
 use crate::result::ServoFile;
 use crate::study::StudyRobot;
@@ -6,17 +6,18 @@ use dynident_model::mjcf::{ServoChange, included_from, rewrite_servos};
 use dynident_model::{DescriptionFormat, JointChange, Model, link_changes, rewrite_mjcf, rewrite_urdf};
 use std::path::Path;
 
-/// Robot descriptions with the found values.
+/// Robot descriptions with the identified values.
 #[derive(Debug, Default)]
 pub(in crate::jobs) struct ServoModelFiles {
     pub(in crate::jobs) mjcf: Option<String>,
     pub(in crate::jobs) urdf: Option<String>,
-    /// Why there is no description, in words.
+    /// Reason why there is no description.
     pub(in crate::jobs) missing: Option<String>,
 }
 
-/// Writes the found values into the user's MJCF or URDF. Friction is one number there: the mean of the training
-/// logs. Simulators read positions without a delay, so the file has the delay from a command to its measurement.
+/// Writes the identified values into the user's MJCF or URDF. Friction is a single number there: the mean over the
+/// training logs. Simulators read positions without a delay, so the file contains the delay from a command to its
+/// measurement.
 pub(in crate::jobs) fn model_files(robot: &StudyRobot, found: &Model, result: &ServoFile) -> ServoModelFiles {
     let description = &robot.robot;
     let written = match description.format {

@@ -1,4 +1,4 @@
-//! The identified drives as files for simulators contain them, and the errors of their motion.
+//! The identified drives as simulator files represent them, and the errors of the simulated motion.
 
 use super::{Found, RoleRun};
 use crate::result::{ServoDrive, ServoFile, ServoForm, ServoFormLog};
@@ -6,10 +6,10 @@ use dynident_identification::Role;
 use dynident_servo::{Drive, DriveLaw, ServoError, ServoRobot, errors, simulate_with_law};
 use rayon::prelude::*;
 
-/// Part of the friction of a joint that must depend on load or speed to be mentioned.
+/// Smallest part of a joint's friction that must depend on transmitted torque or velocity to be mentioned.
 const VARIABLE_FRICTION: f64 = 0.01;
 
-/// A form, and how its drives are simulated.
+/// A file format, and how its drives are simulated.
 struct Form {
     name: &'static str,
     law: DriveLaw,
@@ -17,7 +17,7 @@ struct Form {
     delay: FormDelay,
 }
 
-/// Delay of the drives in a form.
+/// Delay of the drives in a file format.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FormDelay {
     None,
@@ -25,7 +25,7 @@ enum FormDelay {
     Steps,
 }
 
-/// Simulates all logs with the drives of each form.
+/// Simulates all logs with the drives as each file format represents them.
 ///
 /// # Errors
 /// Runs that do not fit the robot.
@@ -85,12 +85,12 @@ fn written(form: &Form, file: &ServoFile, runs: &[RoleRun], found: &Found) -> Re
     })
 }
 
-/// Time from a command to its measurement: simulators read positions without a delay.
+/// Time from a command to its measurement, because simulators read positions without a delay.
 fn effective_delay(drive: &Drive) -> f64 {
     (drive.delay_s - drive.read_delay_s).max(0.0)
 }
 
-/// Parts of the drives that a form lacks or represents by another law.
+/// Parts of the drives that a file format lacks or represents by another law.
 fn lost(form: &Form, delay_steps: &[u32], file: &ServoFile, found: &Found) -> Vec<String> {
     let drives = &found.robot.drives;
     let list = |items: Vec<String>| items.join(", ");

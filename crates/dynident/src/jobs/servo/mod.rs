@@ -25,12 +25,12 @@ use files::ServoModelFiles;
 use std::path::Path;
 use std::time::Instant;
 
-/// Found drives and bodies of a study with commands.
+/// Identified drives and bodies of a study with commands.
 #[derive(Debug)]
 pub struct ServoOutcome {
     /// Content of `result.json`.
     pub result: ServoFile,
-    /// The motions of all logs, held-out logs first.
+    /// The motions of all logs; held-out logs come first.
     pub motions: Vec<ServoMotion>,
     /// The user's MJCF with the new values and position actuators; if missing, the notes have the reason.
     pub mjcf: Option<String>,
@@ -120,7 +120,7 @@ fn training_runs(
     training.map(read).collect()
 }
 
-/// The log in the order of the robot's joints, with commands limited to what the servos accept.
+/// The log with the joints in the robot's order, and commands limited to what the servos accept.
 fn run_of(study: StudyFile<'_>, index: usize, motion: &CommandedMotion, model: &Model, section: &ServoSection) -> Run {
     let place = |name: &str| motion.joints.iter().position(|joint| joint == name);
     let places: Vec<usize> = model.joints().iter().filter_map(|joint| place(&joint.name)).collect();
@@ -166,7 +166,7 @@ fn payloads(
     Ok(all)
 }
 
-/// A finished search with the robot that it found.
+/// A finished search, with the robot that it identified.
 pub(super) struct Found {
     pub(super) nominal: ServoRobot,
     pub(super) parameters: Vec<dynident_servo::FreeParameter>,
@@ -209,8 +209,8 @@ fn fitted(study: StudyFile<'_>, fit: &Fit, options: &RunOptions<'_>) -> Result<F
     on_threads(options.threads, work)
 }
 
-/// The drives where a search begins: stated values, torque limits of the robot description, and other values from the
-/// responses of the joints.
+/// The drives with which a search begins: values in the study, torque limits of the robot description, and other
+/// values from the responses of the joints.
 fn first_drives(model: &Model, runs: &[Run], section: &ServoSection) -> Result<Vec<Drive>, StudyError> {
     let stated = section.drives(vec![Drive::typical(1.0, 1.0, 1.0, 1.0); model.dof()])?;
     let mut start = start_drives(model, runs, &stated, section.fit.alike);
@@ -223,7 +223,7 @@ fn first_drives(model: &Model, runs: &[Run], section: &ServoSection) -> Result<V
     section.drives(start)
 }
 
-/// Runs `work` with a pool of threads; without threads on this one.
+/// Runs `work` with a pool of threads; if no pool can be created, on the current thread.
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(work),

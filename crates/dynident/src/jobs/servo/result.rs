@@ -10,12 +10,12 @@ use dynident_identification::Role;
 use dynident_model::{JointKind, Model};
 use dynident_servo::{Drive, Quantity, Run, Scale, ServoRobot, ServoValue, errors, values};
 
-/// Largest number of samples of a motion.
+/// Maximum number of samples of a motion.
 const MOST_SAMPLES: usize = 1500;
-/// A value is determined if its interval is at most this part of that before the fit.
+/// A value is determined if the width of its interval is at most this share of the width before the fit.
 pub(super) const DETERMINED: f64 = 0.5;
-/// The scale is determined if its interval is at most this part of that before the fit: without an anchor, the fit
-/// narrows it by less than a quarter.
+/// The common scale is determined if the width of its interval is at most this share of the width before the fit.
+/// Without a known reference the fit narrows it by less than a quarter.
 const SCALE_DETERMINED: f64 = 0.5;
 
 pub(super) fn servo_file(
@@ -75,7 +75,7 @@ pub(super) fn servo_file(
     Ok(file)
 }
 
-/// A sentence for each log with intervals that the model does not explain.
+/// One sentence for each log with time intervals that the model does not explain.
 fn unexplained(file: &ServoFile, runs: &[RoleRun], found: &Found) -> Vec<String> {
     let training: Vec<&RoleRun> = runs.iter().filter(|run| run.role != Role::Validate).collect();
     let of_log = |(index, run): (usize, &&RoleRun)| {
@@ -158,9 +158,9 @@ fn scale_of(scale: &Scale, runs: &[RoleRun]) -> ServoScale {
 /// Means of a joint over the measured motion of the training logs.
 #[derive(Clone, Copy, Debug, Default)]
 struct DriveMeans {
-    /// Torque of weight and velocity without sign, Nm (N).
+    /// Mean torque of gravity and velocity effects without its sign, Nm (N).
     load: f64,
-    /// Largest friction at the load and velocity, Nm (N).
+    /// Largest friction at this transmitted torque and velocity, Nm (N).
     friction: f64,
 }
 
@@ -200,7 +200,7 @@ fn log_of(run: &RoleRun, simulated: &[Vec<f64>]) -> ServoLog {
     }
 }
 
-/// The motions of all logs, held-out logs first.
+/// The motions of all logs; held-out logs come first.
 pub(super) fn motions(runs: &[RoleRun], found: &Found) -> Vec<ServoMotion> {
     let all = || runs.iter().zip(&found.simulated);
     let held_out = |(run, _): &(&RoleRun, _)| run.role == Role::Validate;
@@ -220,7 +220,7 @@ fn motion_of(run: &Run, simulated: &[Vec<f64>]) -> ServoMotion {
     }
 }
 
-/// Adds values that are not determined, and reasons not to use the result.
+/// Adds notes on values that are not determined, and on reasons not to use the result.
 fn remarks(file: &mut ServoFile) {
     let name = |owner: &str, value: &ServoNumber| format!("{} of {owner}", value.name);
     for (joint, drive) in file.joints.iter().zip(&file.drives) {

@@ -7,8 +7,8 @@ use crate::result::{IterationRun, IterationsFile};
 use dynident_report::{ConvergencePlot, PrintPanel};
 
 impl Figure {
-    /// Tracking error of every joint and error bars of the parameters by run; errors of the parameters if the truth is
-    /// known.
+    /// Plots the tracking error of every joint and the error bars of the parameters by run; if the true parameters
+    /// are known, also the errors of the parameters.
     pub fn convergence(file: &IterationsFile) -> Self {
         let mut data = Data::new(["run", "accepted", "quantity", "of", "unit", "value"]);
         let mut add = |run: &IterationRun, quantity: &str, of: &str, unit: &str, value: f64| {
@@ -46,7 +46,7 @@ impl Figure {
     }
 }
 
-/// Root mean square; not a number without values.
+/// Root mean square; NaN if there are no values.
 fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (count, sum) = values.fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value * value));
     (sum / count as f64).sqrt()

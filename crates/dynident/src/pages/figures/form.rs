@@ -1,25 +1,26 @@
 use crate::error::FigureError;
 use std::path::Path;
 
-/// Form of a file of a figure.
+/// File format of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FigureForm {
-    /// The picture; text in the fonts of the reader's computer.
+    /// The picture; text uses fonts of the reader's computer.
     Svg,
-    /// The picture; text in an embedded font.
+    /// The picture; text uses an embedded font.
     Pdf,
     /// The picture in pixels.
     Png,
-    /// Every drawn number, with the shortest text that gives the same number. An empty cell is a missing value.
+    /// All plotted numbers, each as the shortest text that parses to the same number. An empty cell is a missing
+    /// value.
     Csv,
-    /// The table, with the rules of the package booktabs.
+    /// The table as LaTeX, with the rules of the package booktabs.
     Latex,
-    /// The table.
+    /// The table as Markdown.
     Markdown,
 }
 
 impl FigureForm {
-    /// The form of a file, by the ending of its name.
+    /// The format of a file, by the ending of its name.
     ///
     /// # Errors
     /// [`FigureError::Ending`]

@@ -9,14 +9,15 @@ use dynident_model::JointKind;
 use dynident_report::{Cell, LinePlot, PrintPanel, Table, short};
 use std::path::Path;
 
-/// Points on each side of a friction curve: enough for a line without marks.
+/// Number of points on each side of a friction curve, enough for a smooth line.
 const POINTS: usize = 150;
-/// Largest velocity of a curve without recorded velocities and without a limit, rad/s (m/s).
+/// Largest velocity of a curve if there are neither recorded velocities nor a limit, rad/s (m/s).
 const DEFAULT_VELOCITY: f64 = 1.0;
 
 impl Figure {
-    /// Friction and constant torque of each joint against its velocity, in the range of the recorded velocities. Terms
-    /// that depend on load or temperature are left out; friction with memory has its value after a long motion.
+    /// Plots friction and constant torque of each joint against its velocity, in the range of the recorded
+    /// velocities. Terms that depend on transmitted torque or temperature are omitted. Friction with hysteresis has
+    /// its value after a long motion in one direction.
     ///
     /// # Errors
     /// A result without its robot (of an older version, or of a payload on a known arm).
@@ -35,7 +36,7 @@ impl Figure {
                 if own.kind == JointKind::Prismatic { ["m/s", "N"] } else { ["rad/s", "Nm"] };
             let largest = largest_velocity(r, &robot, joint);
             let side = |sign: f64| (1..=POINTS).map(move |k| sign * largest * k as f64 / POINTS as f64);
-            // A gap at zero, where friction steps.
+            // The curve has a gap at zero velocity, where friction is discontinuous.
             let velocities: Vec<f64> =
                 side(-1.0).collect::<Vec<_>>().into_iter().rev().chain([0.0]).chain(side(1.0)).collect();
             let torque = |velocity: &f64| {
@@ -58,7 +59,7 @@ impl Figure {
     }
 }
 
-/// Largest recorded velocity of a joint, else its limit.
+/// Largest recorded velocity of a joint, otherwise its limit.
 fn largest_velocity(r: &ResultFile, robot: &RobotModel, joint: usize) -> f64 {
     let histograms = r.logs.iter().filter_map(|log| log.velocities.get(joint));
     let recorded = histograms.flat_map(VelocityHistogram::moving).map(|(velocity, _)| velocity.abs());

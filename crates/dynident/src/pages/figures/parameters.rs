@@ -5,7 +5,7 @@ use crate::result::{BaseParameterResult, ResultFile};
 use dynident_report::{BarPlot, Cell, PrintPanel, Table, short};
 
 impl Figure {
-    /// Base parameters with 95 % error bars and the values of the robot description, one plot for each unit.
+    /// Plots base parameters with 95 % error bars and the values of the robot description, one plot for each unit.
     pub fn parameters(r: &ResultFile) -> Self {
         let panels = units(r.base_parameters.iter().map(|own| own.unit.as_str())).into_iter().map(|of_unit| {
             let own = r.base_parameters.iter().filter(|own| own.unit == of_unit);
@@ -40,7 +40,7 @@ impl Figure {
     }
 }
 
-/// The estimate; not a number for an unexcited parameter.
+/// The estimate; NaN for a parameter that the logs do not excite.
 fn value(own: &BaseParameterResult) -> f64 {
     if own.excited { own.value } else { f64::NAN }
 }

@@ -6,8 +6,8 @@ use dynident_identification::examination::LogTrace;
 use dynident_report::{LinePlot, PrintPanel};
 
 impl Figure {
-    /// Measured and predicted torque of every joint over time and their difference, one plot for each joint and log.
-    /// The table has the errors of the joints as the result states them.
+    /// Plots measured and predicted torque of every joint over time, and their difference, one plot for each joint
+    /// and log. The table contains the errors of the joints from the result.
     pub fn residuals(r: &ResultFile, traces: &[LogTrace]) -> Self {
         let mut data = Data::new(["log", "joint", "time_s", "measured_nm", "predicted_nm", "residual_nm"]);
         let mut panels = Vec::new();
