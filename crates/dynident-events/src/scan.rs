@@ -25,7 +25,8 @@ const MERGE_S: f64 = 0.3;
 const MIN_TORQUE_SHARE: f64 = 0.1;
 /// Minimum ratio of predicted to measured torque (squares) if the drives are off.
 const OFF_RATIO: f64 = 10.0;
-/// Minimum predicted torque for such a comparison, relative to the usual residual of the joint (squares).
+/// Minimum predicted torque with which drives can be reported as off, relative to the usual residual of the joint
+/// (squares).
 const OFF_PREDICTED: f64 = 16.0;
 /// Maximum torque of each joint if the drives are off, relative to its root mean square torque in the log.
 const OFF_TORQUE_SHARE: f64 = 0.1;

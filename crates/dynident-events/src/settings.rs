@@ -30,19 +30,21 @@ pub struct EventSettings {
     /// Minimum mean square of unexplained torque in an interval, relative to the usual residual of the joint in the
     /// same state of motion, for a clear event.
     pub clear_ratio: f64,
-    /// Minimum of the same ratio as [`clear_ratio`](Self::clear_ratio), for a warning.
+    /// Minimum mean square of unexplained torque in an interval, relative to the usual residual of the joint, for a
+    /// warning.
     pub warn_ratio: f64,
     /// Minimum mean square of unexplained torque, relative to the worst interval of the same length in the rest of the
     /// log, for a clear event. The comparison with the worst of all other intervals accounts for the number of tested
     /// intervals.
     pub clear_prominence: f64,
-    /// Minimum of the same ratio as [`clear_prominence`](Self::clear_prominence), for a warning.
+    /// Minimum mean square of unexplained torque, relative to the worst interval of the same length in the rest of the
+    /// log, for a warning.
     pub warn_prominence: f64,
     /// Minimum unexplained torque relative to the torque of the joint (both root mean square), for a clear event.
     /// Smaller residuals can result from friction in very slow motion or errors of a torque sensor; they change a fit
     /// little.
     pub clear_effect: f64,
-    /// Minimum of the same ratio as [`clear_effect`](Self::clear_effect), for a warning.
+    /// Minimum unexplained torque relative to the torque of the joint (both root mean square), for a warning.
     pub min_effect: f64,
     /// Maximum share of a log that is excluded automatically; rests with the drives off are not included in this share.
     /// If the share is larger, it is not clear which part of the log is normal.

@@ -62,7 +62,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let known = training.columns.is_plain().then_some(theta);
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
-    // This is done before the diagnosis, which can then use the motions in memory.
+    // The held-out recordings are read before the diagnosis, which can then use the motions in memory.
     let model: RegressorModel = robot.clone().into();
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));

@@ -59,8 +59,8 @@ pub struct ScoreSettings {
     /// Unexplained share of the torque of all joints above which lower cut-offs are tried and held-out logs are not
     /// examined. Default 0.5.
     pub max_unexplained: f64,
-    /// Lower cut-offs to try in this case, relative to the cut-off that was selected from the data. Default 0.5 and
-    /// 0.25.
+    /// Lower cut-offs that are tried if the unexplained share exceeds `max_unexplained`, relative to the cut-off that
+    /// was selected from the data. Default 0.5 and 0.25.
     pub lower_cutoffs: [f64; 2],
     /// Largest number of mistakes in one study. Default 3.
     pub max_mistakes: usize,
@@ -255,7 +255,8 @@ pub struct ChannelSettings {
     /// joints, divided by separate parameters of the joint. Default 2.4. Seven sets of real logs reach 1.8, single logs
     /// of these sets 2.3.
     pub min_doubted_ratio: f64,
-    /// The same ratio above which the torque does not belong to this robot. Default 2.6.
+    /// Ratio of two unexplained shares of a joint (as in `min_doubted_ratio`) above which its torque does not belong to
+    /// this robot. Default 2.6.
     pub min_foreign_ratio: f64,
     /// Smallest unexplained share of a joint that is reported as doubtful. Default 0.03.
     pub min_doubted_unexplained: f64,

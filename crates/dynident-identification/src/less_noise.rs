@@ -18,7 +18,7 @@ pub(crate) struct Fit<'a> {
     pub(crate) settings: IdentificationSettings,
 }
 
-/// Reason for keeping the stated friction in this case.
+/// Reason for keeping the stated friction if `auto` selected instrumental variables.
 const NOISE_REASON: &str = "position noise biases the least squares that would select it";
 
 /// Applies the estimator that `auto` selected; `robot` has the drive inertia that resulted from the test. If `auto`

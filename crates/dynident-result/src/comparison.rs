@@ -38,7 +38,7 @@ pub struct ComparedResult {
     pub name: String,
     /// Name of the robot.
     pub robot: String,
-    /// Held-out logs with the error of the written model, percent; null if the torque is zero.
+    /// Held-out logs with the error of the exported model, percent; null if the torque is zero.
     pub held_out: Vec<(String, Option<f64>)>,
 }
 

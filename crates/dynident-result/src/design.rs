@@ -40,7 +40,7 @@ pub struct DesignFile {
     pub criterion_figure: Option<f64>,
     /// Condition number of the base regressor, rows of all samples and joints stacked, in SI units without weights.
     pub condition_number: Option<f64>,
-    /// Condition number of the same stacked regressor after each column is divided by its norm.
+    /// Condition number of the stacked base regressor after each column is divided by its norm.
     pub condition_number_scaled: Option<f64>,
     /// `log det WᵀW` of the stacked base regressor W, for a torque noise of 1 Nm (N).
     pub log_det: Option<f64>,

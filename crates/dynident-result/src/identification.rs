@@ -206,14 +206,14 @@ pub struct MethodSummary {
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number: f64,
-    /// Condition number of the same columns after each is divided by its norm.
+    /// Condition number of the weighted regressor's base columns after each column is divided by its norm.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number_scaled: f64,
     /// Method that selects the independent columns of the regressor, which define the base parameters.
     pub base_columns: String,
-    /// Margin of that selection: the smallest relative residual of a column that was classified as independent, and the
-    /// largest of a column that was classified as dependent.
+    /// Margin of the selection of base columns: the smallest relative residual of a column that was classified as
+    /// independent, and the largest of a column that was classified as dependent.
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; fixed at the prior (or zero).
     #[serde(default)]

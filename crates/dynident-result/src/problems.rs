@@ -24,8 +24,8 @@ pub struct ProblemSettings {
     /// Residual of a held-out log divided by that of the training logs (root mean square over the joints). A larger
     /// ratio is a problem. Default 4: ten real data sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
     pub max_held_out_ratio: f64,
-    /// Limit of the same ratio as `max_held_out_ratio` if `check` found a joint torque that no physically consistent
-    /// model explains. Default 2.
+    /// Limit of the residual ratio in `max_held_out_ratio` if `check` found a joint torque that no physically
+    /// consistent model explains. Default 2.
     pub max_held_out_ratio_if_inconsistent: f64,
     /// Unexplained torque of a held-out log, percent. Below it, `max_held_out_ratio` is not applied to the log. Default
     /// 1.

@@ -41,8 +41,8 @@ pub struct ServoDesignFile {
     pub not_checked: Vec<String>,
     /// Logarithm of the determinant of the information matrix, including priors.
     pub log_det: f64,
-    /// Logarithm of the same determinant for a chirp (sine of rising frequency) of all joints with the same length,
-    /// range, speed and highest frequency.
+    /// `log_det` for a chirp (sine of rising frequency) of all joints with the same length, range, speed and highest
+    /// frequency.
     pub chirp_log_det: f64,
     /// Expected error bar divided by the expected error bar of the chirp, geometric mean over all values; the common
     /// factor of torques, inertias and masses is assumed known.

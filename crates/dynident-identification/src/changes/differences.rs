@@ -13,8 +13,8 @@ use nalgebra::{DMatrix, DVector};
 /// preferred.
 const SMALL_PROBABILITY: f64 = 0.5;
 
-/// Prior probability of small differences of all bodies between two estimates, and of large ones. Two estimates are
-/// usually of the same robot, whose bodies did not change.
+/// Prior probability of small differences of all bodies between two estimates, and of large ones. Two estimates usually
+/// belong to the same robot, whose bodies did not all change.
 const OTHER_ROBOT_PROBABILITY: f64 = 0.05;
 
 /// Expected value of the common factor of a changed body, minus 1.
@@ -35,22 +35,24 @@ const MIN_SHARE_OF_LARGEST: f64 = 0.1;
 /// Explanations of the difference between an estimate and the description of its robot, or between two estimates.
 #[derive(Clone, Debug)]
 pub struct Differences {
-    /// All explanations, the most probable first; `covariance` is the index of the spread of all bodies.
+    /// All explanations, the most probable first; `covariance` of an explanation is an index in `sizes`: the size of
+    /// the differences of all bodies.
     pub explanations: Vec<Explanation>,
-    /// Part of each group of the explanations; two groups for each body with an effect: a change of ten values, and a
-    /// common factor.
+    /// Part of the robot to which each group of unknowns belongs. A body with an effect on the torque has two groups: a
+    /// change of its ten values, and a common factor.
     pub(super) parts: Vec<Part>,
     /// Change of the values of the part per unknown of each group; for a body, its ten inertial parameters.
     pub(super) unknowns: Vec<DMatrix<f64>>,
-    /// Difference of the compared base parameters from the description.
+    /// Difference of the compared base parameters from the description, or between two estimates.
     pub(super) difference: DVector<f64>,
-    /// Covariance of the estimates of these base parameters; it treats friction and drive parameters as unknown.
+    /// Covariance of the difference of the compared base parameters; compared with a description, friction and drive
+    /// parameters are treated as unknown.
     pub(super) covariance: DMatrix<f64>,
     /// Matrix E: effect of all inertial parameters on the compared base parameters.
     pub(super) effects: DMatrix<f64>,
     /// Sizes of the differences of all bodies that are compared.
     pub(super) sizes: Vec<Spread>,
-    /// Covariance of all parameters of the bodies for each of them.
+    /// Prior covariance of all inertial parameters for each of `sizes`.
     pub(super) spreads: Vec<DMatrix<f64>>,
 }
 
@@ -161,7 +163,7 @@ impl Differences {
         Ok(())
     }
 
-    /// A value of the size of the differences of all bodies, for each explanation.
+    /// For each explanation, `value` of the size of the differences of all bodies.
     fn of_sizes(&self, value: impl Fn(&Spread) -> f64) -> Vec<f64> {
         self.explanations.iter().map(|own| value(&self.sizes[own.covariance])).collect()
     }
@@ -229,12 +231,12 @@ impl Differences {
         (change, covariance)
     }
 
-    /// Sets of parts that differ, bodies by more than the others, with their total probability over all sizes of the
-    /// differences of the others, the most probable first. The empty set means that all bodies differ at most by the
-    /// small differences of `limits`. Each set comes with the explanation with the smallest differences of the other
-    /// bodies that the logs do not contradict.
+    /// Sets of parts that changed, the most probable set first; bodies in a set differ by more than the other bodies.
+    /// The probability of a set is the total over all sizes of the differences of the other bodies. The empty set means
+    /// that all bodies differ at most by the small differences of `limits`. Each set is returned with one explanation:
+    /// the smallest differences of the other bodies that the logs do not contradict.
     pub fn sets(&self, limits: &DescriptionThresholds) -> Vec<(f64, &Explanation)> {
-        // Total and largest probability, and the explanation.
+        // Total and largest probability of the set, and its explanation.
         let mut sets: Vec<(f64, f64, &Explanation)> = Vec::new();
         for own in self.explanations.iter().filter(|own| !self.is_everywhere(own, limits)) {
             let parts = self.parts_of(own);

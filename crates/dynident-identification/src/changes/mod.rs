@@ -1,8 +1,9 @@
 //! Statistical test of which parts of a robot differ from its description, or between two results.
 //!
 //! [`parts`] lists the parts with their effect on the base parameters. [`Differences`] compares explanations of the
-//! difference from the robot description or between two estimates: nothing, one or two parts, or small or large
-//! differences of every body. From a description it also gives the masses that follow from all explanations.
+//! difference from the robot description or between two estimates: no change, a change of one or two parts, or small or
+//! large differences of every body. For a robot description, it also computes the uncertainty of the bodies over all
+//! explanations.
 
 mod average;
 mod differences;

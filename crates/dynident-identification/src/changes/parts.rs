@@ -70,10 +70,10 @@ pub(super) fn effects(base: &BaseParameters) -> DMatrix<f64> {
     all
 }
 
-/// The parts of a robot with their effects on the base parameters with the indices `rows`. `values` contains the size
+/// The parts of a robot, with their effects on the base parameters with the indices `rows`. `values` contains the size
 /// of each of these base parameters: its absolute value plus its error bar, and of two compared results the larger one.
-/// A term that belongs to a base parameter with others, such as the drive inertia of the first joint with the inertia
-/// of the first link, has at most the value of this parameter.
+/// If a term is only identifiable in a sum with other parameters (such as the drive inertia of the first joint with the
+/// inertia of the first link), its size is at most that of this base parameter.
 pub fn parts(model: &Model, base: &BaseParameters, rows: &[usize], values: &[f64]) -> Parts {
     let effects = effects(base).select_rows(rows);
     let largest_value = |column: usize| {

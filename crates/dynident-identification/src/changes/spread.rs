@@ -25,7 +25,8 @@ impl Spread {
         self.largest() <= SMALL
     }
 
-    /// Share of the prior probability among the small or the large differences of [`SPREADS`], in equal parts.
+    /// Share of this size in the prior probability of all small (or all large) sizes in [`SPREADS`]; these have equal
+    /// shares.
     pub(super) fn share(self) -> f64 {
         1.0 / SPREADS.iter().filter(|own| own.is_small() == self.is_small()).count() as f64
     }
@@ -69,7 +70,8 @@ pub(super) fn nominal_values(robot: &ParametricModel, body: usize) -> DVector<f6
     DVector::from_column_slice(&robot.nominal()[10 * body..10 * body + 10])
 }
 
-/// Covariance of all parameters of the bodies for each size, from their directions `spread`.
+/// Covariance of all inertial parameters for each size. `spread` contains the changes of the parameters in independent
+/// directions.
 pub(super) fn covariances_of(spread: &DMatrix<f64>, robot: &ParametricModel, sizes: &[Spread]) -> Vec<DMatrix<f64>> {
     let inertial = robot.model().inertial_count();
     let of_shape = spread * spread.transpose();

@@ -37,7 +37,7 @@ struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
     merged: Vec<LogFactors>,
-    /// The same rows without the additional columns for changed constants.
+    /// The rows without the additional columns for changed constants.
     problem: LinearProblem,
     fit: WeightedValues,
 }

@@ -20,7 +20,7 @@ pub(super) struct Explanation {
     instants_per_parameter: Vec<f64>,
     /// Residual with one set of base parameters, physically consistent or not.
     pub(super) free: Vec<f64>,
-    /// These base parameters.
+    /// Base parameters of the fit with one set of base parameters.
     pub(super) free_parameters: Vec<f64>,
     /// Residual with the best physically consistent set; empty without a fit.
     pub(super) consistent: Vec<f64>,

@@ -55,7 +55,7 @@ pub(super) struct MotionSamples {
     pieces: Vec<usize>,
     /// Time between rows, s.
     spacing_s: f64,
-    /// Number of these rows per row of a fit.
+    /// Number of these samples per row of a fit.
     rows_of_fit: f64,
     /// For each row, the largest interpolated share of a joint's torque; empty if no sample was rejected.
     interpolated: Vec<f64>,

@@ -11,7 +11,7 @@ use dynident_dynamics::ParametricModel;
 const MAX_FITTED_UNITS: usize = 4;
 /// Step of the search for the range of a factor, as the logarithm of the factor.
 const RANGE_STEP: f64 = 0.2;
-/// Accuracy of the ends of that range, as the logarithm of the factor.
+/// Accuracy of the ends of the range of a factor, as the logarithm of the factor.
 const RANGE_ACCURACY: f64 = 0.03;
 
 /// The hypothesis with a better number of its last mistake; `None` if its number is already the best. `at` is the study

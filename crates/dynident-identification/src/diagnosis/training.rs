@@ -130,7 +130,7 @@ fn select_search(searches: [Search; 2], study: &CorrectedStudy) -> Search {
     let (best, tried) = (all.believed(), all.tried);
     let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - study.settings.score.min_gain;
     let is_shown_by_torque = gains(Hypothesis::torque_score) || best.is_shown_by_travel();
-    // Such a factor changes the ratio of torque to motion, as the bodies of another robot do.
+    // A torque gain or another sample rate changes the ratio of torque to motion, as the bodies of another robot do.
     let has_free_factor = best.mistakes.iter().any(|mistake| {
         let facts = mistake.facts();
         facts.torque_gain.is_some() || facts.is_other_rate

@@ -54,7 +54,7 @@ pub struct WithoutEvents {
     pub left_out_s: Vec<[f64; 2]>,
     /// Share of the log's rows that are excluded, from 0 to 1.
     pub left_out_share: f64,
-    /// Errors for the same torque as those of the complete log.
+    /// Errors for the torque in the same frequency band as the errors of the complete log.
     pub model: ValidationReport,
     /// Errors of the physically consistent set for the same torque.
     pub physical: Option<ValidationReport>,

@@ -117,8 +117,8 @@ struct LagColumns {
 }
 
 impl LagColumns {
-    /// Computes these columns from the predicted torque, the measured torque, and the indices of samples that are
-    /// invalid in the regressor.
+    /// Computes the columns from the predicted torque, the measured torque, and the indices of samples that are invalid
+    /// in the regressor.
     fn new(
         model: &[f64],
         measured: &[f64],

@@ -21,7 +21,7 @@ const DENSITY_KG_M3: f64 = 500.0;
 /// Prior standard deviation of the logarithm of the sphere's moment of inertia: a factor of 2, which corresponds to a
 /// factor of 3 in density.
 const LOG_MOMENT_STD: f64 = 0.7;
-/// Search range for the moment of inertia: this factor in both directions.
+/// Search range for the moment of inertia, as a factor in both directions.
 const MAX_MOMENT_FACTOR: f64 = 100.0;
 /// Number of steps of this search in each direction.
 const MOMENT_STEPS: i32 = 60;

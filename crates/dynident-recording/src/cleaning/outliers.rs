@@ -19,7 +19,7 @@ const NEIGHBOURS: usize = 3;
 /// Maximum share of outliers that directly follow another outlier. If the share is larger, the deviations are pulses of
 /// the real torque.
 const MAX_ADJACENT_SHARE: f64 = 0.2;
-/// Minimum number of outliers for which this share is used.
+/// Minimum number of outliers for which `MAX_ADJACENT_SHARE` is used.
 const MIN_OUTLIERS_FOR_PULSES: usize = 10;
 /// Number of adjacent samples that form a pulse of the real torque (a contact, a drive that catches up), if all deviate
 /// in the same direction.

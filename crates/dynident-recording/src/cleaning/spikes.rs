@@ -8,7 +8,7 @@ const REACH: usize = 4;
 /// Maximum RMS deviation of the fourth differences around a spike from the pattern of an ideal spike, relative to the
 /// largest fourth difference. For a kink in the motion it is a sixth.
 const MAX_PATTERN_ERROR: f64 = 0.08;
-/// The same limit for small spikes, for which three standard deviations of the noise exceed the normal limit.
+/// Limit of `MAX_PATTERN_ERROR` for small spikes, for which three standard deviations of the noise exceed that limit.
 const MAX_PATTERN_ERROR_IN_NOISE: f64 = 0.14;
 
 /// Replaces single spikes in the range `own` of `x` by the cubic through their four neighbours, and returns their

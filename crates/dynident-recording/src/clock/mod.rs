@@ -38,8 +38,8 @@ pub struct Clock {
     /// RMS error with which the four neighbours of a position predict it by a cubic, for even spacing, relative to the
     /// motion; `None` if it was not needed.
     pub misfit_uniform: Option<f64>,
-    /// RMS error of the same prediction for samples at their stamps, relative to the motion; `None` if it was not
-    /// needed.
+    /// RMS error with which the four neighbours of a position predict it by a cubic, for samples at their stamps,
+    /// relative to the motion; `None` if it was not needed.
     pub misfit_stamps: Option<f64>,
     /// Range of the deviations of the smoothed stamps from an even grid, steps; `None` if it was not needed.
     #[serde(default)]

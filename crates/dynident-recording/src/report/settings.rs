@@ -23,7 +23,8 @@ pub struct ReportSettings {
     /// Minimum logarithm of the ratio of a logged velocity to the derivative of the position with which another unit or
     /// sample rate is reported, 0.05 by default.
     pub min_log_factor: f64,
-    /// Maximum relative difference of this ratio from the factor of a unit, for the unit to be named, 0.02 by default.
+    /// Maximum relative difference of the ratio of a logged velocity to the derivative of the position from the factor
+    /// of a unit, for the unit to be named, 0.02 by default.
     pub unit_tolerance: f64,
     /// Correlation of a logged derivative with the derivative of the position below which the signs are reported as
     /// opposite, -0.5 by default.

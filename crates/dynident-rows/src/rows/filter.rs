@@ -29,7 +29,7 @@ impl Default for ParallelFilterSettings {
 }
 
 impl From<Option<&DecimationSettings>> for ParallelFilterSettings {
-    /// The same filter at any rate; `None` disables it.
+    /// Settings of the parallel filter with the values of a decimation; `None` disables the filter.
     fn from(filter: Option<&DecimationSettings>) -> Self {
         match filter {
             Some(&DecimationSettings { factor, cutoff_hz, transition_hz, stop_band_db }) => {

@@ -44,13 +44,13 @@ impl Setup<'_> {
 pub(in crate::diagnosis) enum Proof {
     #[default]
     Score,
-    /// This joint must have a small residual. (A dead or noisy channel fits equally well in any unit.)
+    /// The mistaken joint must have a small residual. (A dead or noisy channel fits equally well in any unit.)
     Joint(usize),
-    /// This joint must have a small residual. For a mistake that is only tried if the joint travels far beyond its
-    /// range.
+    /// The mistaken joint must have a small residual. For a mistake that is only tried if the joint travels far beyond
+    /// its range.
     Travel(usize),
-    /// This joint must have a small and clearly improved residual. (A wrong gain may otherwise only compensate for
-    /// other joints.)
+    /// The mistaken joint must have a small and clearly improved residual. (A wrong gain may otherwise only compensate
+    /// for other joints.)
     JointGain(usize),
     /// The score without joint limits must improve. (An offset can always move a joint back between its limits, and
     /// these limits may be wrong.)
@@ -142,7 +142,7 @@ pub(super) trait MistakeKind {
         self.with_number(1.0)
     }
 
-    /// The same mistake in other channels, if possible.
+    /// The mistake in other channels (position or torque), if possible.
     fn with_channels(&self, _channels: Channels) -> Option<Mistake> {
         None
     }
