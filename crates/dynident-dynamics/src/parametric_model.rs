@@ -163,7 +163,7 @@ impl ParametricModel {
     /// of new terms come from the robot description.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Same as for [`new`](Self::new).
     pub fn with_terms(&self, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
         let mut other = Self::new(self.model.clone(), terms)?;
         let bodies = 10 * self.model.body_count();

@@ -61,7 +61,7 @@ pub enum EstimationError {
     Setting {
         /// Name of the setting.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// The fix.
         fix: &'static str,
@@ -116,7 +116,7 @@ pub enum EstimationError {
     /// or a negative variance. Correct the function.
     #[error("invalid result of the estimator `{name}`: {problem}")]
     Own {
-        /// Its name.
+        /// Name of the estimator.
         name: String,
         /// The problem and its fix.
         problem: String,

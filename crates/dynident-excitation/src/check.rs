@@ -82,7 +82,7 @@ pub fn check_limits(
 /// `stop` is called every 1000 samples.
 ///
 /// # Errors
-/// As [`check_limits()`].
+/// Same as for [`check_limits()`].
 pub fn check_limits_until(
     limits: &Limits,
     model: &Model,

@@ -47,7 +47,7 @@ impl RobotModel {
     /// Replaces the torque terms, with one value each; the bodies for load-dependent friction are kept.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Same as for [`new`](Self::new).
     pub fn with_terms(&self, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
         Ok(Self { load: self.load.clone(), ..Self::new(self.model.clone(), terms, values)? })
     }
@@ -67,7 +67,7 @@ impl RobotModel {
     /// call, or if no term has hysteresis, exported code has no function with state.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Same as for [`new`](Self::new).
     pub fn with_state_terms(self, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
         check_terms(&terms, &values)?;
         let checked = ParametricModel::new(self.model.clone(), terms)?;

@@ -160,7 +160,7 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
 /// Like [`export`], with options for exported code.
 ///
 /// # Errors
-/// As [`export`], or an option that the format does not have.
+/// Same as for [`export`], or an option that the format does not have.
 pub fn export_with(
     robot: &RobotModel,
     target: Target,

@@ -142,7 +142,7 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
 /// Like [`open`], with other memory limits.
 ///
 /// # Errors
-/// As [`open`].
+/// Same as for [`open`].
 pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError> {
     let refused = |source| FileError::Io { file: path.to_owned(), source };
     let folder = std::fs::metadata(path).map_err(refused)?.is_dir();
@@ -220,7 +220,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
 /// Opens a text table with one line for each quantity and one value for each sample. Lines need no names.
 ///
 /// # Errors
-/// As [`open`], and lines of different length.
+/// Same as for [`open`], and lines of different length.
 pub fn open_transposed(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError> {
     let refused = |source| FileError::Io { file: path.to_owned(), source };
     let file = dynident_files::open(path).map_err(refused)?;

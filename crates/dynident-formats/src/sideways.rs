@@ -38,7 +38,7 @@ pub(crate) fn may_begin(head: &[u8]) -> bool {
 /// The table in a text; `None` if the text is not recognised as such a table.
 ///
 /// # Errors
-/// As [`open`](crate::open); for a stated layout also lines of different length.
+/// Same as for [`open`](crate::open); for a stated layout also lines of different length.
 pub(crate) fn open(
     path: &Path,
     mut reader: impl BufRead,

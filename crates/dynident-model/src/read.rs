@@ -106,7 +106,7 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
 /// such files.
 ///
 /// # Errors
-/// As [`load_robot`], and those of `expand`.
+/// Same as for [`load_robot`], and those of `expand`.
 pub fn load_robot_with<E: From<ReadError>>(
     path: &Path,
     expand: impl FnOnce(&Path) -> Result<String, E>,

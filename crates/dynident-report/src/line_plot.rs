@@ -181,7 +181,7 @@ impl LinePlot {
     /// Renders the plot as a static SVG of `width` by `height` px, for documents.
     ///
     /// # Errors
-    /// As [`Report::html`](crate::Report::html).
+    /// Same as for [`Report::html`](crate::Report::html).
     pub fn svg(&self, width: f64, height: f64) -> Result<String, ReportError> {
         self.check()?;
         self.picture().svg(width, height, Place::Document)

@@ -15,7 +15,7 @@ impl PrintFigure {
     /// Renders the figure as PNG with the resolution of the style, which the file states.
     ///
     /// # Errors
-    /// As [`PrintFigure::svg`]; [`ReportError::Resolution`]; [`ReportError::Pixels`];
+    /// Same as for [`PrintFigure::svg`]; [`ReportError::Resolution`]; [`ReportError::Pixels`];
     /// [`ReportError::Characters`]; [`ReportError::NotBuilt`] without the feature `png`.
     pub fn png(&self, style: &PrintStyle) -> Result<Vec<u8>, ReportError> {
         png(&self.svg(style)?, style.dpi)

@@ -14,7 +14,7 @@ pub enum SimulationError {
     Value {
         /// The setting, as in a file.
         what: String,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// The fix.
         fix: &'static str,
@@ -54,7 +54,7 @@ pub enum SimulationError {
     Negative {
         /// Symbol of the term.
         term: String,
-        /// Its parameter.
+        /// Parameter of the term.
         value: f64,
     },
     /// A joint of the simulated robot moves neither a mass nor a drive inertia, so that its acceleration is undefined.

@@ -21,7 +21,7 @@ pub enum RunStatus {
         joint: String,
         /// Limited quantity.
         quantity: LimitedQuantity,
-        /// Its value, rad, rad/s (m, m/s).
+        /// Value of the quantity, rad or rad/s (m or m/s).
         value: f64,
         /// The limit.
         limit: f64,

@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    /// With `exportable` the model has no term that the form cannot hold, unless a key states it.
+    /// With `exportable` the model has no term that the export format cannot contain, unless the study gives it.
     #[test]
     fn models_for_a_form_have_its_terms() {
         let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");

@@ -253,7 +253,7 @@ impl Study {
     /// files are searched relative to it.
     ///
     /// # Errors
-    /// As [`parse`](Study::parse), without line and column.
+    /// Same as for [`parse`](Study::parse), without line and column.
     pub fn from_json(text: &str, path: &Path) -> Result<Self, StudyFileError> {
         let wrong =
             |error: serde_json::Error| StudyFileError::study(path)(StudyError::Toml { problem: error.to_string() });
@@ -276,7 +276,7 @@ impl Study {
     /// The study as JSON, with the keys of the TOML.
     ///
     /// # Errors
-    /// As [`serde_json::to_value`].
+    /// Same as for [`serde_json::to_value`].
     pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
         // Compiled once here; otherwise each generic call elsewhere would compile the writers of all sections again.
         serde_json::to_value(self)

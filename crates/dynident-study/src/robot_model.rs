@@ -37,7 +37,7 @@ impl Study {
     /// not start programs. Other robot files are not read here.
     ///
     /// # Errors
-    /// As [`load_robot`].
+    /// Same as for [`load_robot`].
     pub fn expand_robot(
         &mut self,
         study_path: &Path,

@@ -56,7 +56,7 @@ impl<'a> StudyFile<'a> {
     /// Builds the robot of the study.
     ///
     /// # Errors
-    /// As [`StudyRobot::new`].
+    /// Same as for [`StudyRobot::new`].
     pub fn robot_in(self, folders: &Folders) -> Result<StudyRobot, StudyFileError> {
         StudyRobot::new(self.study, self.path, folders)
     }

@@ -67,7 +67,7 @@ impl Study {
     /// Recordings of all logs from their sources.
     ///
     /// # Errors
-    /// As [`recording`](Self::recording).
+    /// Same as for [`recording`](Self::recording).
     pub fn recordings(
         &self,
         robot: &StudyRobot,

@@ -22,7 +22,7 @@ pub enum PhysicalError {
     NotFinite {
         /// The quantity.
         what: String,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
     },
     /// A setting of the physically consistent fit is outside its range. Write a value within the range that the message
@@ -31,7 +31,7 @@ pub enum PhysicalError {
     Setting {
         /// Name of the setting.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// The fix.
         fix: &'static str,

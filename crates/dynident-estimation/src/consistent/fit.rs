@@ -26,7 +26,7 @@ pub enum PhysicalStatus {
 /// Result for one body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhysicalBodyFit {
-    /// Its name.
+    /// Name of the body.
     pub name: String,
     /// Smallest eigenvalue of the pseudo-inertia whitened by the reference, `P0^{-1/2} P P0^{-1/2}`: at least the
     /// margin, except for a known body.

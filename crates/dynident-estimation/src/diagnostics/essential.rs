@@ -40,7 +40,7 @@ impl EssentialSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DroppedParameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
     /// Value before it was dropped.
     pub value: f64,

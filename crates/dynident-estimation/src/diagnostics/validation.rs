@@ -99,7 +99,7 @@ impl Validation {
     /// Adds consecutive samples of joint number `joint`.
     ///
     /// # Errors
-    /// As [`add`](Self::add), and [`EstimationError::Mismatch`] for a joint out of range.
+    /// Same as for [`add`](Self::add), and [`EstimationError::Mismatch`] for a joint out of range.
     pub fn add_joint(&mut self, joint: usize, measured: &[f64], predicted: &[f64]) -> Result<(), EstimationError> {
         let joints = self.sums.len();
         if measured.len() != predicted.len() {

@@ -54,7 +54,7 @@ impl InstrumentedProblem {
     /// of `columns`, then the regressor in the same order, then the torque.
     ///
     /// # Errors
-    /// As [`LinearProblem::add`]; the factor must have twice as many columns as `columns` names.
+    /// Same as for [`LinearProblem::add`]; the factor must have twice as many columns as `columns` names.
     pub fn add(
         &mut self,
         log: &str,
@@ -74,7 +74,7 @@ impl InstrumentedProblem {
     /// Sets the values of columns that the instruments do not distinguish; zero by default.
     ///
     /// # Errors
-    /// As [`LinearProblem::with_fallback`].
+    /// Same as for [`LinearProblem::with_fallback`].
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
         let both = values.iter().chain(&values).copied().collect();
         crate::error::expect("fallback values", self.names.len(), values.len())?;
@@ -86,7 +86,7 @@ impl InstrumentedProblem {
     /// Sets columns to hold at their fallback values, like [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
-    /// As [`LinearProblem::with_unexcited`].
+    /// Same as for [`LinearProblem::with_unexcited`].
     pub fn with_unexcited(mut self, unexcited: Unexcited) -> Result<Self, EstimationError> {
         let checked = LinearProblem::new(self.names.clone(), Vec::new()).with_unexcited(unexcited)?;
         self.unexcited = checked.unexcited().clone();

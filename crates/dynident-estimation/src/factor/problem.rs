@@ -138,7 +138,7 @@ impl LinearProblem {
     /// shape (any, columns): rows `[S | S m]` with unit noise. A diagonal S holds 1/std of each parameter.
     ///
     /// # Errors
-    /// As [`with_fallback`](Self::with_fallback).
+    /// Same as for [`with_fallback`](Self::with_fallback).
     pub fn with_prior(mut self, mean: Vec<f64>, sqrt_information: DMatrix<f64>) -> Result<Self, EstimationError> {
         expect("prior mean", self.columns.len(), mean.len())?;
         expect("columns of the prior's square-root information", self.columns.len(), sqrt_information.ncols())?;
@@ -236,7 +236,7 @@ impl LinearProblem {
     /// from noise.
     ///
     /// # Errors
-    /// As [`combined`](Self::combined); [`EstimationError::Overflow`] if the other columns are dependent.
+    /// Same as for [`combined`](Self::combined); [`EstimationError::Overflow`] if the other columns are dependent.
     pub fn combined_without_noise(
         &self,
         weights: &[f64],

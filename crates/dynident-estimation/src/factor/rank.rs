@@ -45,9 +45,9 @@ impl RankSettings {
 /// A column that is not estimated, because the data do not distinguish it from earlier columns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FixedColumn {
-    /// Its index.
+    /// Index of the column.
     pub column: usize,
-    /// Its name.
+    /// Name of the column.
     pub name: String,
     /// The value at which it was fixed.
     pub value: f64,

@@ -95,7 +95,7 @@ impl SegmentedFactor {
     /// Creates a factor without rows for `columns` regressor columns and the torque.
     ///
     /// # Errors
-    /// As [`SegmentSettings::validate`].
+    /// Same as for [`SegmentSettings::validate`].
     pub fn new(columns: usize, settings: SegmentSettings) -> Result<Self, EstimationError> {
         settings.validate()?;
         Ok(Self {
@@ -159,7 +159,7 @@ impl SegmentedFactor {
     /// [`TriangularFactor::absorb`].
     ///
     /// # Errors
-    /// As [`TriangularFactor::absorb`]; on error nothing is absorbed.
+    /// Same as for [`TriangularFactor::absorb`]; on error nothing is absorbed.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
         check_panel(self.columns, panel, rows)?;
         self.total = OnceLock::new();

@@ -88,7 +88,7 @@ impl TriangularFactor {
     /// The factor of given rows: `panel` column by column (all rows of column 0 first; torque last).
     ///
     /// # Errors
-    /// As [`absorb`](Self::absorb).
+    /// Same as for [`absorb`](Self::absorb).
     pub fn from_rows(columns: usize, panel: &[f64], rows: usize) -> Result<Self, EstimationError> {
         let mut factor = Self::new(columns);
         factor.absorb(panel, rows)?;
@@ -150,7 +150,7 @@ impl TriangularFactor {
     /// Like [`absorb`](Self::absorb), without allocation once the workspace is large enough.
     ///
     /// # Errors
-    /// As [`absorb`](Self::absorb).
+    /// Same as for [`absorb`](Self::absorb).
     pub fn absorb_with(
         &mut self,
         workspace: &mut FactorWorkspace,
@@ -261,7 +261,7 @@ impl TriangularFactor {
     /// Like [`merge`](Self::merge), without allocation once the workspace is large enough.
     ///
     /// # Errors
-    /// As [`merge`](Self::merge).
+    /// Same as for [`merge`](Self::merge).
     pub fn merge_with(&mut self, workspace: &mut FactorWorkspace, other: &Self) -> Result<(), EstimationError> {
         expect("columns of merged factors", self.columns, other.columns)?;
         self.absorb_factor(workspace, other);

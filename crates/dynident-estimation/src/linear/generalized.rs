@@ -105,7 +105,7 @@ impl CrossProblem {
     /// Sets the values of columns that the data do not excite; zero by default.
     ///
     /// # Errors
-    /// As [`LinearProblem::with_fallback`].
+    /// Same as for [`LinearProblem::with_fallback`].
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
         LinearProblem::new(self.columns.clone(), self.joints.clone()).with_fallback(values.clone())?;
         self.fallback = values;
@@ -115,7 +115,7 @@ impl CrossProblem {
     /// Sets columns to hold at their fallback values, like [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
-    /// As [`LinearProblem::with_unexcited`].
+    /// Same as for [`LinearProblem::with_unexcited`].
     pub fn with_unexcited(mut self, unexcited: Unexcited) -> Result<Self, EstimationError> {
         let checked = LinearProblem::new(self.columns.clone(), self.joints.clone()).with_unexcited(unexcited)?;
         self.unexcited = checked.unexcited().clone();

@@ -77,7 +77,7 @@ pub struct HausmanTest {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HausmanColumn {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
     /// γ: difference between the coefficients of the column's noise and of its motion.
     pub contrast: f64,

@@ -83,7 +83,7 @@ pub struct NoiseWeightedEstimate {
 /// weights as known.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the
+/// Same as for [`weighted_least_squares`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the
 /// problem; and the errors of `pass`. Reaching `max_passes` is a status, not an error.
 ///
 /// ```

@@ -90,7 +90,7 @@ pub fn weighted_least_squares(
 /// the time.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Overflow`] for a value that is not finite.
+/// Same as for [`weighted_least_squares`]; [`EstimationError::Overflow`] for a value that is not finite.
 pub fn weighted_values(
     problem: &LinearProblem,
     settings: &WeightedSettings,

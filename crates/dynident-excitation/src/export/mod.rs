@@ -79,7 +79,7 @@ pub enum ExportError {
     Setting {
         /// Name of the setting.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// Valid range.
         needed: &'static str,

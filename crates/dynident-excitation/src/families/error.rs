@@ -13,7 +13,7 @@ pub enum FamilyError {
         family: &'static str,
         /// Name of the setting.
         setting: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// Valid values.
         fix: &'static str,

@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// A sharp stroke approximates the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 is at u = 8/κ, so
+    /// A sharp stroke is close to that of the paper: near its middle φ = ωt (1 + u² + ..), and ωt = 8 is at u = 8/κ, so
     /// that the relative change of φ is (8/κ)².
     #[test]
     fn large_sharpness_is_the_papers_stroke() {

@@ -85,10 +85,10 @@ impl LogisticStrokesSettings {
 ///
 /// Parameters per joint, in this order:
 /// * overlapping: h, A_1..A_K, ω_1..ω_K in 1/s, and positions τ_1..τ_K in time from 0 (the stroke begins with the
-/// motion) to 1 (it ends with the motion). If the motion returns, A_K follows from the other amplitudes and is not a
-/// parameter, so that there are 3 K parameters.
+///   motion) to 1 (it ends with the motion). If the motion returns, A_K follows from the other amplitudes and is not a
+///   parameter, so that there are 3 K parameters.
 /// * spliced: h, A_1..A_K (as above), κ_1..κ_K, and logarithms of the lengths of slots 1..K-1 relative to the last
-/// slot. If the motion returns, there are 3 K - 1 parameters.
+///   slot. If the motion returns, there are 3 K - 1 parameters.
 ///
 /// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so that both ends are exactly
 /// at rest, with all derivatives zero.

@@ -71,7 +71,7 @@ pub enum LimitError {
     OutOfRange {
         /// The quantity.
         what: String,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
         /// Minimum value.
         at_least: f64,

@@ -79,7 +79,7 @@ pub enum OptimiserError {
     Setting {
         /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
         /// Valid range.
         needed: &'static str,

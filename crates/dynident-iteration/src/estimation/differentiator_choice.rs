@@ -31,7 +31,7 @@ const MAX_LAG_S: f64 = 0.5;
 pub struct DifferentiatorChoice {
     /// The selected differentiator.
     pub taken: DifferentiatorSettings,
-    /// Its name.
+    /// Name of the selected differentiator.
     pub name: String,
     /// All candidates, in order.
     pub candidates: Vec<DifferentiatorCandidate>,
@@ -41,7 +41,7 @@ pub struct DifferentiatorChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DifferentiatorCandidate {
-    /// Its name.
+    /// Name of the candidate.
     pub name: String,
     /// Number of usable samples.
     pub samples: usize,

@@ -99,7 +99,7 @@ impl RunEstimate {
 /// a run differs from the others, each run gets its own offset ([`RunOffsets`](crate::RunOffsets)).
 ///
 /// # Errors
-/// As [`identify_run`](crate::identify_run).
+/// Same as for [`identify_run`](crate::identify_run).
 pub fn identify_runs(
     task: &IterationTask,
     runs: &[RunLog<'_>],

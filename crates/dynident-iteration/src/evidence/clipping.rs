@@ -147,7 +147,7 @@ mod tests {
         // |sin| > 0.8 for 41 % of a turn.
         let seen = clipping(&[record(cut.clone())], 0, None, 0.0).unwrap();
         assert!((seen.share - 0.41).abs() < 0.02 && seen.torque == 8.0 && !seen.stated, "{seen:?}");
-        // The same with a stated limit, and with noise that hides the edge.
+        // The same with a given limit, and with noise that hides the edge.
         let noisy = cut.iter().enumerate().map(|(k, tau)| tau + 0.04 * (12.9898 * k as f64).sin()).collect();
         let noisy = [record(noisy)];
         for limit in [Some(8.0), None, Some(28.0)] {

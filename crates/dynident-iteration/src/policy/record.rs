@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct UsedController {
     /// Name of the controller.
     pub name: String,
-    /// Its model; `None` for controllers without a model.
+    /// Model in the controller; `None` for controllers without a model.
     pub model: Option<ModelParameters>,
     /// Share of the change from the last good parameters to the new parameters.
     pub damping: f64,

@@ -25,7 +25,7 @@ impl ProcessRobot {
     /// ([`ProcessSettings::permitted`]).
     ///
     /// # Errors
-    /// As [`ProcessSettings::validate`].
+    /// Same as for [`ProcessSettings::validate`].
     pub fn new(
         settings: ProcessSettings,
         joints: Vec<String>,

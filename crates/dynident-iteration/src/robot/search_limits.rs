@@ -16,7 +16,7 @@ impl EnvelopeSettings {
     /// description has the inertials of all bodies.
     ///
     /// # Errors
-    /// As [`envelope`](Self::envelope).
+    /// Same as for [`envelope`](Self::envelope).
     pub fn narrow(&self, mut limits: Limits, model: &Model, margin: f64) -> Result<Limits, SimulationError> {
         let envelope = self.envelope(model)?;
         let errors: Vec<f64> = envelope.tracking_error.iter().map(|error| margin * error.unwrap_or(0.0)).collect();

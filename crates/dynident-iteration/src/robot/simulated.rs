@@ -17,7 +17,7 @@ impl SimulatedRobot {
     /// Creates a simulated robot.
     ///
     /// # Errors
-    /// As [`LoopSettings::validate`].
+    /// Same as for [`LoopSettings::validate`].
     pub fn new(plant: Plant, settings: LoopSettings) -> Result<Self, SimulationError> {
         settings.validate(plant.dof())?;
         let joints = plant.model().joints().iter().map(|joint| joint.name.clone()).collect();

@@ -85,7 +85,7 @@ impl ApproachPaths {
     /// Returns the paths, executed at a share of their speed.
     ///
     /// # Errors
-    /// As [`Reference::slowed`].
+    /// Same as for [`Reference::slowed`].
     pub fn slowed(&self, speed: f64) -> Result<Self, SimulationError> {
         Ok(Self { approach: self.approach.slowed(speed)?, back: self.back.slowed(speed)? })
     }
@@ -93,7 +93,7 @@ impl ApproachPaths {
     /// Returns approach, motion and return as one reference, for a controller that runs all of them without a pause.
     ///
     /// # Errors
-    /// As [`validate`](Self::validate).
+    /// Same as for [`validate`](Self::validate).
     pub fn around(&self, motion: &Reference) -> Result<Reference, SimulationError> {
         self.validate(motion)?;
         let (before, after) = (self.approach.samples() - 1, self.back.samples() - 1);

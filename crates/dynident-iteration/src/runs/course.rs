@@ -53,7 +53,7 @@ pub fn iterate(
 /// stopped is not used: its log is kept in a separate folder, and the next call repeats the run.
 ///
 /// # Errors
-/// As [`iterate()`].
+/// Same as for [`iterate()`].
 pub fn iterate_supervised(
     iteration: &Iteration,
     robots: &mut [&mut dyn Robot],

@@ -35,7 +35,7 @@ impl Iteration {
     /// Creates the iteration of a task.
     ///
     /// # Errors
-    /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
+    /// Same as for [`IterationTask::validate`] and [`IterationSettings::validate`].
     pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
         task.validate()?;
         settings.validate(task.robot.dof())?;

@@ -159,7 +159,7 @@ impl HomeSettings {
     /// Like [`ways`](Self::ways), but the search ends with [`HomeError::Interrupted`] once `stop` returns true.
     ///
     /// # Errors
-    /// As [`ways`](Self::ways).
+    /// Same as for [`ways`](Self::ways).
     pub fn ways_until(
         &self,
         model: &Model,

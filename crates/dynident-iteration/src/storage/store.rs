@@ -98,7 +98,7 @@ impl IterationStore {
     /// Checks whether a fresh start may remove the existing runs. Changes nothing.
     ///
     /// # Errors
-    /// As [`open`](Self::open) without `resume`.
+    /// Same as for [`open`](Self::open) without `resume`.
     pub fn may_begin_afresh(folder: &Path) -> Result<(), IterationError> {
         let runs = folder.join("runs");
         if runs.is_dir() { RunsFolder::read(&runs)?.may_remove_runs() } else { Ok(()) }

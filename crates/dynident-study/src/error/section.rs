@@ -54,7 +54,7 @@ pub enum StudyError {
     Number {
         /// The key.
         key: String,
-        /// Its value.
+        /// Value of the key.
         value: f64,
         /// The valid values.
         expected: Expected,

@@ -10,7 +10,7 @@ impl Figure {
     /// Writes files in the formats that their endings define: all of them, or none if one cannot be drawn.
     ///
     /// # Errors
-    /// As [`Figure::contents`] and [`FigureForm::of`]; a file that cannot be written.
+    /// Same as for [`Figure::contents`] and [`FigureForm::of`]; a file that cannot be written.
     pub fn write(&self, files: &[PathBuf], style: &PrintStyle) -> Result<(), Error> {
         let contents = files.iter().map(|path| self.contents(FigureForm::of(path)?, style));
         let contents = contents.collect::<Result<Vec<_>, _>>()?;

@@ -99,7 +99,7 @@ impl TorquePredictor {
     /// Residuals are filtered as in the fit (`band_hz`, unless the settings contain it).
     ///
     /// # Errors
-    /// As [`Watch::new`].
+    /// Same as for [`Watch::new`].
     pub fn watch(&self, settings: &WatchSettings) -> Result<Watch, OnlineError> {
         let reference = StartingPoint { values: self.theta.clone(), covariance: self.covariance.clone() };
         let settings = WatchSettings { band_hz: settings.band_hz.or(self.band_hz), ..settings.clone() };

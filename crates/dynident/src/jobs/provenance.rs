@@ -91,7 +91,7 @@ pub(crate) fn read_input(what: &str, source: &StudyInput, study: StudyFile<'_>) 
 /// Computes the [`provenance()`] of a design, simulation or iteration, with further inputs.
 ///
 /// # Errors
-/// As [`provenance()`].
+/// Same as for [`provenance()`].
 pub(crate) fn motion_provenance(
     study: StudyFile<'_>,
     data: Option<&Path>,

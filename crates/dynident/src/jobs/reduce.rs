@@ -93,7 +93,7 @@ fn without_logs(study: &Study, robot: &StudyRobot) -> Study {
 /// examination, held-out logs.
 ///
 /// # Errors
-/// As [`identify()`](crate::identify()).
+/// Same as for [`identify()`](crate::identify()).
 pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
     let start = Instant::now();
     let study = StudyFile::new(&factors.study, &factors.study_path);

@@ -18,7 +18,7 @@ use std::path::Path;
 /// filter of each log. `result_path` is the name of the result in messages.
 ///
 /// # Errors
-/// As [`validate_result()`](crate::validate_result).
+/// Same as for [`validate_result()`](crate::validate_result).
 pub fn test_samples(
     stored: &ResultFile,
     result_path: &Path,

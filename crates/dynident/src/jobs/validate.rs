@@ -28,7 +28,7 @@ pub fn validate(
 /// Like [`validate()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
-/// As [`validate()`].
+/// Same as for [`validate()`].
 pub fn validate_result(
     stored: &ResultFile,
     result_path: &Path,
@@ -42,7 +42,7 @@ pub fn validate_result(
 /// Torque over time of the logs that [`validate_result()`] uses: measured, and predicted by the exported model.
 ///
 /// # Errors
-/// As [`validate()`].
+/// Same as for [`validate()`].
 pub fn validation_traces(
     stored: &ResultFile,
     result_path: &Path,

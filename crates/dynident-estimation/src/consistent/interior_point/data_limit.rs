@@ -23,7 +23,7 @@ struct Stage {
     data_squares: f64,
 }
 
-/// As [`interior_point`](super::interior_point), and also returns the iterates.
+/// Like [`interior_point`](super::interior_point), and also returns the iterates.
 pub(in crate::consistent) fn interior_point_with_path(
     program: &Program,
     start: DVector<f64>,

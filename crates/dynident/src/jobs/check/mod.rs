@@ -46,7 +46,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
 /// Like [`check()`], with other thresholds.
 ///
 /// # Errors
-/// As [`check()`], and invalid thresholds.
+/// Same as for [`check()`], and invalid thresholds.
 pub fn check_with(
     study: &Study,
     study_path: &Path,

@@ -17,7 +17,7 @@ pub(in crate::jobs) struct MotionFamily {
 /// The trajectory family of a study; the velocity of every joint must be limited.
 ///
 /// # Errors
-/// As [`design_study`](super::design_study).
+/// Same as for [`design_study`](super::design_study).
 pub(in crate::jobs) fn motion_family(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<MotionFamily, Error> {
     let setup = DesignSetup::for_search(study, options)?;
     let family = setup.section.family.family(setup.robot.model().dof(), setup.section.duration_s);

@@ -116,7 +116,7 @@ pub(super) fn loaded(study: StudyFile<'_>, robot: &StudyRobot) -> Result<Model, 
 /// Limits of a study's robot for approach and return paths.
 ///
 /// # Errors
-/// As [`in_force`].
+/// Same as for [`in_force`].
 pub(in crate::jobs) fn limits_of(study: StudyFile<'_>, folders: &Folders, robot: &StudyRobot) -> Result<Limits, Error> {
     Ok(in_force(study, folders, robot, LimitsFor::Ways)?.limits)
 }
@@ -140,7 +140,7 @@ fn starts(
 /// not limited, because the drive limits them.
 ///
 /// # Errors
-/// As [`in_force`].
+/// Same as for [`in_force`].
 pub(in crate::jobs) fn limits_of_commands(
     study: StudyFile<'_>,
     folders: &Folders,

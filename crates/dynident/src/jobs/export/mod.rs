@@ -59,7 +59,7 @@ pub fn export_model(
 /// Like [`export_model()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
-/// As [`export_model()`].
+/// Same as for [`export_model()`].
 pub fn export_result(
     stored: &ResultFile,
     result_path: &Path,
@@ -226,7 +226,7 @@ pub fn export_payload(result_path: &Path, name: Option<&str>, reader: Controller
 /// Like [`export_payload()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
-/// As [`export_payload()`].
+/// Same as for [`export_payload()`].
 pub fn export_payload_of(
     stored: &ResultFile,
     result_path: &Path,

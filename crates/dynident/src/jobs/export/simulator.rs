@@ -27,7 +27,7 @@ pub fn export_simulator(
 /// Like [`export_simulator()`] with a result in memory; `result_path` is its name in messages.
 ///
 /// # Errors
-/// As [`export_simulator()`].
+/// Same as for [`export_simulator()`].
 pub fn export_simulator_of(
     stored: &ResultFile,
     result_path: &Path,

@@ -89,7 +89,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
 /// the parameters converge), or a repeated run.
 ///
 /// # Errors
-/// As [`identify()`], and errors of `source`.
+/// Same as for [`identify()`], and errors of `source`.
 pub fn identify_with_instruments(
     study: &Study,
     study_path: &Path,

@@ -59,7 +59,7 @@ pub fn iterate_study(
 /// Like [`iterate_study`], with a robot of the caller: `robot` receives the joint names and returns the robot.
 ///
 /// # Errors
-/// As [`iterate_study`], and legs with locked joints, which only the simulator supports.
+/// Same as for [`iterate_study`], and legs with locked joints, which only the simulator supports.
 pub fn iterate_with_robot(
     study: &Study,
     study_path: &Path,

@@ -68,7 +68,7 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
 /// Like [`new_study()`], with other thresholds.
 ///
 /// # Errors
-/// As [`new_study()`], and invalid thresholds.
+/// Same as for [`new_study()`], and invalid thresholds.
 pub fn new_study_with(
     request: &NewStudy,
     options: &RunOptions<'_>,
