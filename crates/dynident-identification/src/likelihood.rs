@@ -45,7 +45,7 @@ pub fn bic(problem: &LinearProblem, fit: &Estimate) -> f64 {
 mod tests {
     use super::*;
 
-    /// Four copies of every row contain the information of one.
+    /// Four copies of every row contain as much information as the row alone.
     #[test]
     fn repeated_rows_do_not_add_evidence() {
         let score = |rows: usize| JointScore { rows, sigma: 0.3, own: 5 };

@@ -235,7 +235,7 @@ fn uneven_weights(weights: &mut [Vec<f64>; 3], half: usize, rate_hz: f64) -> boo
 mod tests {
     use super::*;
 
-    /// A cubic of each joint and its derivatives.
+    /// Position, velocity and acceleration of each joint, which moves on a cubic polynomial.
     fn cubic(t: f64) -> ([f64; 2], [f64; 2], [f64; 2]) {
         let of = |c: [f64; 4]| {
             let q = c[0] + t * (c[1] + t * (c[2] + t * c[3]));
@@ -269,7 +269,7 @@ mod tests {
             assert_eq!(found.tau[1], (place - half) as f64);
             let (q, dq, ddq) = cubic(middle);
             for joint in 0..2 {
-                // Rounding of the weights, which divide by the square of the period.
+                // Tolerance for the rounding of the weights, which are divided by the square of the period.
                 assert!((found.q[joint] - q[joint]).abs() < 1e-11, "{place}");
                 assert!((found.dq[joint] - dq[joint]).abs() < 1e-9, "{place}");
                 assert!((found.ddq[joint] - ddq[joint]).abs() < 1e-7, "{place}: {:?} {ddq:?}", found.ddq);

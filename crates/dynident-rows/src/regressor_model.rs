@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use dynident_model::terms::{DriveChoice, terms_per_joint};
 
-    /// The drive's part of `Izz1 + Ia1` does not load the gear.
+    /// The drive inertia `Ia1` in the sum `Izz1 + Ia1` does not load the gear.
     #[test]
     fn drive_inertia_in_a_body_parameter_is_not_load() {
         let model =

@@ -94,7 +94,7 @@ mod tests {
         assert!(((cost(3.0) - cost(1.0)) / expected - 1.0).abs() < 1e-4, "{} {expected}", cost(3.0) - cost(1.0));
     }
 
-    /// The weight is the derivative of the cost by the squares.
+    /// The weight is the derivative of the cost by the squared error.
     #[test]
     fn weights_are_derivatives() {
         let at = |add: f64| {

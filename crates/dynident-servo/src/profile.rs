@@ -91,15 +91,16 @@ impl Profile {
 mod tests {
     use super::*;
 
-    /// Step of 0.4 rad at 0.1 s with an acceleration of 40 rad/s²: time-optimal without and with a limit of the speed.
+    /// A step of 0.4 rad at 0.1 s with an acceleration of 40 rad/s², time-optimal without and with a limit on the
+    /// speed.
     #[test]
     fn a_step_takes_the_shortest_time() {
         let (times, commands) = ([0.0, 0.1, 1.0], [0.0, 0.4, 0.4]);
-        // Triangle of velocity: 2 √(d / a) = 0.2 s, highest velocity √(d a) = 4 rad/s.
+        // Triangular velocity: duration 2 √(d / a) = 0.2 s, highest velocity √(d a) = 4 rad/s.
         let free = profile(&times, &commands, [40.0, f64::INFINITY]);
         assert!((free.at(0.2) - 0.2).abs() < 0.005 && (free.at(0.1) - 0.0).abs() < 1e-9, "{}", free.at(0.2));
         assert!(free.at(0.29) < 0.4 - 1e-4 && (free.at(0.304) - 0.4).abs() < 1e-9, "{}", free.at(0.304));
-        // Trapezium with 2 rad/s: d / s + s / a = 0.25 s.
+        // Trapezoidal velocity with 2 rad/s: duration d / s + s / a = 0.25 s.
         let slow = profile(&times, &commands, [40.0, 2.0]);
         assert!(slow.at(0.34) < 0.4 - 1e-4 && (slow.at(0.354) - 0.4).abs() < 1e-9, "{}", slow.at(0.354));
         // Ramp.

@@ -119,9 +119,10 @@ mod tests {
     fn half_widths_of_mixtures() {
         // One normal distribution: 1.96 standard deviations.
         assert!((half_width_95(&[(1.0, 0.0, 2.0)]) - 2.0 * HALF_WIDTH_95).abs() < 1e-5);
-        // Far from zero: the one-sided 95 % quantile, 1.6449 standard deviations above the mean.
+        // Far from zero, the half-width is the one-sided 95 % quantile: 1.6449 standard deviations above the mean.
         assert!((half_width_95(&[(1.0, 50.0, 2.0)]) - 53.2897).abs() < 1e-3);
-        // 2 % of a wide one: 0.95/0.98 of the narrow one, with its quantile 2.165; the root mean square is 1.73.
+        // 2 % of a wide distribution: the half-width is the quantile 2.165 for 0.95/0.98 of the narrow distribution;
+        // the root mean square is 1.73.
         let mixed = half_width_95(&[(0.98, 0.0, 1.0), (0.02, 0.0, 1e3)]);
         assert!((mixed - 2.165).abs() < 0.01, "{mixed}");
         assert!(half_width_95(&[(1.0, 0.0, 0.0)]) < 1e-9);

@@ -133,7 +133,8 @@ mod tests {
     fn a_changed_body_is_consistent() {
         let nominal = [2.0, 0.2, 0.0, 0.4, 0.15, 0.0, -0.04, 0.17, 0.0, 0.1];
         assert!(consistent_body(&nominal).0);
-        // A consistent load is added as it is, a change without a possible body keeps mass and first moment.
+        // A physically consistent load is added unchanged. A change that gives no possible body keeps only mass and
+        // first moment.
         let load = DVector::from_vec(vec![1.0, 0.1, 0.0, 0.0, 0.01, 0.0, 0.0, 0.02, 0.0, 0.02]);
         let sum = changed_body(&nominal, &load);
         assert!((0..10).all(|k| (sum[k] - nominal[k] - load[k]).abs() < 1e-12), "{sum:?}");

@@ -106,7 +106,7 @@ mod tests {
         let is_lost = |tau: Vec<Vec<f64>>, left: f64| has_lost_signs(&rows(tau), left, &ChannelSettings::default());
         assert!(is_lost(vec![magnitude(torque(0.0)), magnitude(torque(0.1))], 0.4));
         assert!(!is_lost(vec![torque(0.0), magnitude(torque(0.1))], 0.4));
-        // Gravity may hold a joint on one side all the time.
+        // The gravity torque of a joint may have the same sign all the time.
         assert!(!is_lost(vec![torque(2.0), torque(1.5)], 0.01));
     }
 }

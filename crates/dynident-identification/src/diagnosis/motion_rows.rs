@@ -362,8 +362,8 @@ mod tests {
             samples.torque_noise(0)
         };
         let found = of((0..2000).map(|row| smooth(row) + noise(row)).collect());
-        // The median of 2000 third differences varies by about 2 %; uniform noise has another ratio of median and
-        // deviation, and its differences overlap.
+        // The median of 2000 third differences varies by about 2 %. In addition, the ratio of median and standard
+        // deviation is different for uniform noise, and successive third differences share samples.
         assert!((found / deviation.sqrt() - 1.0).abs() < 0.15, "{found}");
         assert!(of((0..2000).map(smooth).collect()) < 0.05);
         assert_eq!(of(vec![1.0, 2.0]), 0.0);
@@ -404,7 +404,7 @@ mod tests {
 
     #[test]
     fn rests_are_left_out_if_enough_motion_remains() {
-        // Two joints that move together half of the time, and a dead one.
+        // Two joints that move at the same time during half of the log, and a dead joint.
         let dq = |row: usize| if (row / 50).is_multiple_of(2) { (0.2 * row as f64).sin() + 1.5 } else { 1e-3 };
         let rows = |count: usize| MotionRows {
             dq: vec![(0..count).map(dq).collect(), (0..count).map(|row| 0.1 * dq(row)).collect(), vec![0.0; count]],

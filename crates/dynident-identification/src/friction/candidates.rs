@@ -177,7 +177,7 @@ pub(crate) fn candidate_columns(
 mod tests {
     use super::*;
 
-    /// Without rows near rest: one step with the stated width, and no terms that need rows near rest.
+    /// Without rows near rest, there is one smoothed sign with the stated width, and no terms that need rows near rest.
     #[test]
     fn terms_near_rest_are_no_candidates_without_rows_near_rest() {
         let scale = JointScale::usual(0);
@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(kinds(&all).len(), 10);
         let names: Vec<_> = kinds(&far).into_iter().map(|kind| kind.name).collect();
         assert_eq!(names, ["viscous", "asymmetric viscous", "coulomb", "asymmetric coulomb", "quadratic", "load"]);
-        // The single step is a separate choice without neighbours on a grid.
+        // The single smoothed sign is a separate choice without neighbours on a grid.
         let columns = candidate_columns(&far, scale, None);
         let options = options(kinds(&far)[2], &columns);
         assert_eq!(options.len(), 1, "{options:?}");

@@ -75,7 +75,7 @@ mod tests {
         let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
         let found = second_start(&[viscous.clone(), coulomb(DRY)], USUAL);
         assert_eq!(found, Some(vec![viscous.clone(), coulomb(smooth(0.002))]));
-        // A width stated as a dead band is kept; a single smooth step can already move.
+        // A width that is stated as a dead band is kept; a single smoothed sign can already change its width.
         assert_eq!(second_start(&[coulomb(CoulombShape::Sign { dead_band: 0.01 })], USUAL), None);
         assert_eq!(second_start(&[viscous, coulomb(smooth(0.1))], USUAL), None);
     }
@@ -83,15 +83,14 @@ mod tests {
     #[test]
     fn second_start_of_exchanged_terms_is_below_the_stribeck_velocity() {
         let found = second_start(&[coulomb(smooth(0.14)), stribeck(smooth(0.02)), load(smooth(0.14))], USUAL);
-        // Load-dependent friction has the same step, because it is one friction.
+        // Load-dependent friction has the same smoothed sign, because both terms describe one friction.
         assert_eq!(found, Some(vec![coulomb(smooth(0.02)), stribeck(smooth(0.02)), load(smooth(0.02))]));
         assert_eq!(second_start(&[coulomb(smooth(0.03)), stribeck(smooth(0.02))], USUAL), None);
         // Stribeck friction of a dry joint stays dry.
         assert_eq!(second_start(&[coulomb(DRY), stribeck(DRY)], USUAL), None);
     }
 
-    /// The arm of the paper with dry friction had widths of 0.0025 and 0.0116, and Stribeck friction was 15 % too
-    /// large.
+    /// An arm with dry friction had fitted widths of 0.0025 and 0.0116, and its Stribeck friction was 15 % too large.
     #[test]
     fn wide_stribeck_friction_of_a_dry_joint_is_rejected() {
         assert!(!is_one_friction(&[coulomb(smooth(0.0025)), stribeck(smooth(0.0116))]));

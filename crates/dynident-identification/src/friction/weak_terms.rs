@@ -143,8 +143,8 @@ mod tests {
         let count = 200;
         let velocity = |row: usize| 0.05 + 0.95 * row as f64 / count as f64;
         let faded = |row: usize| (-(velocity(row) / speed).powi(2)).exp();
-        // 2 Nm for a Stribeck velocity of 0.3; for the narrow one 1.5 Nm in the slowest row, like an outlier. A
-        // deterministic ripple is the noise.
+        // Stribeck friction is 2 Nm with a Stribeck velocity of 0.3. With the narrow Stribeck velocity, it is only
+        // 1.5 Nm in the slowest row, like an outlier. A deterministic ripple is used as noise.
         let size = if speed > 0.1 { 2.0 } else { 1.5 / faded(0) };
         let torque = |row: usize| 5.0 + size * faded(row) + 0.02 * (row as f64 * 2.4).sin();
         let values: Vec<f64> =

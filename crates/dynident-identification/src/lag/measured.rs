@@ -84,10 +84,10 @@ mod tests {
         assert_eq!(pooled_delay(&[]), None);
         assert_eq!(pooled_delay(&[lag(5e-3)]), Some(lag(5e-3)));
         let agreeing = pooled_delay(&[lag(5e-3), lag(5e-3)]).unwrap_or(lag(0.0));
-        // Two equal measurements: the deviation of the mean is that of one divided by √2.
+        // Two equal measurements: the standard deviation of their mean is that of a single measurement divided by √2.
         assert!((agreeing.std_s - 1e-3 / 2_f64.sqrt()).abs() < 1e-12 && (agreeing.lag_s - 5e-3).abs() < 1e-12);
         let apart = pooled_delay(&[lag(0.0), lag(10e-3)]).unwrap_or(lag(0.0));
-        // Half the difference of two is the deviation of their mean.
+        // The standard deviation of the mean is half the difference of the two measurements.
         assert!((apart.std_s - 5e-3).abs() < 1e-12 && !apart.matters);
     }
 }

@@ -300,8 +300,8 @@ mod tests {
         [i[0], i[3], i[5]]
     }
 
-    /// The error bar is thirty times the moments: the body has the inertia of the sphere, and the stated intervals are
-    /// those of the logs.
+    /// The error bar is thirty times the moments of inertia. The body gets the inertia of the sphere, and the reported
+    /// intervals are those from the logs.
     #[test]
     fn an_inertia_that_logs_do_not_determine_is_that_of_a_round_body() {
         let truth = cuboid(0.3, [0.06, 0.08, 0.1], [0.02, 0.0, 0.05]);
@@ -334,7 +334,7 @@ mod tests {
         }
     }
 
-    /// Between both: two moments are determined, the third is not. All values stay in the intervals.
+    /// A mixed case: the logs determine two moments of inertia, but not the third. All values are within the intervals.
     #[test]
     fn values_stay_in_their_intervals() {
         let truth = cuboid(2.0, [0.05, 0.05, 0.5], [0.03, -0.02, 0.2]);
@@ -352,7 +352,7 @@ mod tests {
         }
     }
 
-    /// A sphere of half the density of water has the moment of the rule.
+    /// A sphere with half the density of water has the moment of inertia that the prior assumes.
     #[test]
     fn the_size_is_that_of_packed_boxes() {
         // 4/3 π 0.1³ m³ of 500 kg/m³, moment 2/5 m r².

@@ -278,7 +278,7 @@ mod tests {
     #[test]
     fn ends_on_a_slope_are_valid_and_an_outlier_at_an_end_is_found() {
         for from in (0..4000).step_by(37) {
-            // Without dry friction: for a step close to an end, samples exist on one side only.
+            // Without dry friction: for a jump close to an end of the log, samples exist on one side only.
             let smooth = |i: usize| torque(i) - 4.0 * (1.3 * i as f64 * 0.004).sin().signum();
             let mut x: Vec<f64> = (from..from + 300).map(smooth).collect();
             assert!(found(&x).is_empty(), "{from}: {:?}", found(&x));
@@ -292,7 +292,8 @@ mod tests {
     fn long_tails_are_kept_and_isolated_outliers_are_found() {
         let n = 20_000;
         let (a, b) = (normal(13, n), normal(14, n));
-        // Heavy tails, close to Student's t with 1.5 degrees of freedom: a normal over a power of another.
+        // Noise with long tails, close to Student's t with 1.5 degrees of freedom: a normal variable divided by a power
+        // of another.
         let mut x: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * a[i] / b[i].abs().powf(0.7).max(0.01)).collect();
         let few = found(&x).len();
         // About 0.1 % of the samples exceed eight deviations; only the farthest are flagged.

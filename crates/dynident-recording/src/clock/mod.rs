@@ -310,7 +310,8 @@ mod tests {
         clock(ClockRule::Auto, time_s, row, q, 5.0, &ClockSettings::default())
     }
 
-    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, or one for two.
+    /// Time stamps with two decimals, of a recorder at 125 Hz (four steps of 10 ms for five rows) and at 200 Hz (one
+    /// step for two rows).
     #[test]
     fn rounded_stamps_keep_the_rate_of_the_rows() {
         for rate_hz in [125.0, 200.0, 1000.0] {

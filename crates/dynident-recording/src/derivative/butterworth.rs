@@ -39,8 +39,9 @@ impl Cascade {
     }
 }
 
-/// Adds the first and second differences of a signal x: d1[n] = x[n] - x[n-1] and d2[n] = d1[n+1] - d1[n]. The signal
-/// is constant before its start, so a forward run starts in the steady state of a constant, with zero differences.
+/// Adds the first and second differences of a signal x: `d1[n] = x[n] - x[n-1]` and `d2[n] = d1[n+1] - d1[n]`. The
+/// signal is constant before its start, so a forward run starts in the steady state of a constant, with zero
+/// differences.
 fn add_differences(signal: &mut [Triple]) {
     let last = signal.len() - 1;
     for n in (1..=last).rev() {
@@ -52,7 +53,7 @@ fn add_differences(signal: &mut [Triple]) {
 }
 
 /// Runs the cascade of sections forwards from the steady state of the first value. The run of d2 is one sample ahead of
-/// that of d1: its history starts with d2[-1] = d1[0] - d1[-1] = 0.
+/// that of d1: its history starts with `d2[-1] = d1[0] - d1[-1] = 0`.
 fn run_forwards(sections: &[Section], signal: &mut [Triple]) {
     let start = signal[0][0];
     run(sections, signal, [start, 0.0, 0.0], false);

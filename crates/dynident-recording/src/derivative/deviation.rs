@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn noise_is_smoothed_and_the_reference_is_exact() {
-        // By linearity the noise is that of the smoother, for any reference.
+        // Because the smoother is linear, the noise is that of the smoother, for any reference.
         let n = 1000;
         let noise: Vec<f64> = normal(2, n).iter().map(|e| 1e-3 * e).collect();
         let clean: Vec<f64> = (0..n).map(|i| PATH.at(i as f64 / 100.0)[0]).collect();

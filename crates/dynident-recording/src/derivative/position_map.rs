@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_wrong_branch_would_show_and_samples_outside_the_stroke_are_marked() {
-        // An overshoot by 5 %: q beyond h + A while the reference still moves.
+        // An overshoot by 5 %: the position exceeds h + A while the reference still moves.
         let q: Vec<f64> =
             (0..6100).map(|i| PATH.offset + 1.05 * (PATH.at(place().time_s(i))[0] - PATH.offset)).collect();
         let outside = |x: f64| !(0.0..=1.0).contains(&((x - PATH.offset) / PATH.amplitude));

@@ -407,7 +407,7 @@ mod tests {
             assert_eq!(rows, [[1.0, 2.0], [3.0, 4.0], [8.0, 7.0]], "{text}");
         }
         assert!(table(numbered).names().unwrap().ends_with(&["other_0".to_owned(), "other_1".to_owned()]));
-        // A joint that a row lacks is missing; equal names name nothing.
+        // If a row lacks a joint, its value is missing. If two names are equal, the joints are not named.
         let mut log = table("name0,name1,q0,q1\na,b,1,2\na,c,3,4\n");
         assert_eq!(log.names().unwrap()[2..], ["q[a]", "q[b]"]);
         assert!(all(&mut log)[1][2..].iter().zip([3.0, f64::NAN]).all(|(a, b)| a.to_bits() == b.to_bits()));

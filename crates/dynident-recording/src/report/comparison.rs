@@ -165,7 +165,7 @@ mod tests {
         let swing: (Vec<f64>, Vec<f64>) = (0..5000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
         let found = compared(&[steady.clone(), swing.clone()]);
         assert!(found.correlation > 0.99 && found.lag.is_some_and(|lag| lag.correlation > 0.99), "{found:?}");
-        // The piece alone has the same sign, and its mirror image the opposite one.
+        // The piece alone has a correlation of the same sign, and its mirror image one of the opposite sign.
         assert!(compared(core::slice::from_ref(&steady)).correlation > 0.99);
         let reversed = (swing.0, swing.1.iter().map(|x| -x).collect());
         assert!(compared(&[(steady.0, steady.1.iter().map(|x| -x).collect()), reversed]).correlation < -0.99);

@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn coarse_quantisation_is_not_repetition() {
-        // At half its velocity a joint stays on one step for several rows.
+        // At half the velocity, a joint remains on one quantisation step for several rows.
         assert_eq!(rows_to_a_value(&swing(2000, 1, 0.02)), None);
         assert_eq!(rows_to_a_value(&[vec![1.0; 500], vec![2.0; 500]]), None);
         assert_eq!(rows_to_a_value(&[]), None);

@@ -123,7 +123,7 @@ mod tests {
             }
             pieces.push(f64::from(row), core::iter::once(0.0));
         }
-        // Pieces of 10 rows, except the first of 5 rows: 41 pieces, of which every eighth is kept.
+        // The pieces have 10 rows, except the first, which has 5 rows. Of these 41 pieces, every eighth is kept.
         let expected: Vec<f64> =
             (0..400).filter(|row| if *row < 5 { true } else { ((row - 5) / 10 + 1) % 8 == 0 }).map(f64::from).collect();
         assert_eq!(pieces.columns().0, expected);

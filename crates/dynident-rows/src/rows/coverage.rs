@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use dynident_recording::Decimator;
 
-    /// Rows of `[W | τ]` with `τ = 3 W`, except for the masked samples.
+    /// Rows of `[W | τ]` with `τ = 3 W`, except for the samples that are marked as invalid.
     #[test]
     fn masked_samples_do_not_change_the_equation() {
         let settings = DecimationSettings { factor: 5, ..DecimationSettings::default() };
@@ -156,7 +156,7 @@ mod tests {
             counted += kept.rows;
             for row in 0..kept.rows {
                 let (w, tau) = (kept.panel[row], kept.panel[kept.rows + row]);
-                // Rounding of sums of a hundred products of order one.
+                // Tolerance for the rounding of sums of a hundred products of order one.
                 assert!((tau - 3.0 * w).abs() < 1e-12, "{tau} {w}");
                 // The mean over the remaining samples is close to the mean over all; a row half inside the gap differs
                 // by a tenth.

@@ -80,7 +80,7 @@ mod tests {
         forth.add(&velocities);
         back.add(&velocities.iter().rev().copied().collect::<Vec<_>>());
         assert_eq!(forth, back);
-        // 128 bins of 1/32 reach 4, of 1/64 only 2.
+        // 128 bins of width 1/32 reach a velocity of 4; of width 1/64, only 2.
         assert_eq!(forth.width_rad_s, 1.0 / 32.0);
         let counted: u64 = forth.forward.iter().chain(&forth.backward).sum();
         assert_eq!(counted + forth.resting, 5000);
