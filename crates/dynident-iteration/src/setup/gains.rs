@@ -95,8 +95,8 @@ pub fn lowered_bandwidths(
 ///
 /// * joint PD: `K_p = ω² m`, `K_d = 2 ω m` with `m = (1 - uncertainty) max M_jj(q)` along the motions;
 /// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`. If the robot description
-/// has no drive inertia, the model and M_jj include a typical drive inertia (which the effort limit accelerates by
-/// 300 rad/s²);
+///   has no drive inertia, the model and M_jj include a typical drive inertia (which the effort limit accelerates by
+///   300 rad/s²);
 /// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
 /// So the lightest robot within the uncertainty is not faster than requested. Under computed torque this is true in

@@ -14,8 +14,8 @@ const SPEED: f64 = 2.0;
 /// Returns the nominal parameters with typical values for the drive terms that are zero in the robot description;
 /// `None` if no value was replaced.
 /// * Drive inertia: the effort limit accelerates it by 300 rad/s² (m/s²) on an arm of 1.2 m; on other robots by this
-/// value in [characteristic units](dynident_model::CharacteristicScale). The accelerations of geared arms are 100 to
-/// 500 rad/s²; a UR10's wrist has 0.2 kg m² at 56 Nm.
+///   value in [characteristic units](dynident_model::CharacteristicScale). The accelerations of geared arms are 100 to
+///   500 rad/s²; a UR10's wrist has 0.2 kg m² at 56 Nm.
 /// * Dry friction: 5 % of the effort limit.
 /// * Viscous friction: 5 % of the effort limit at the velocity limit.
 pub fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {

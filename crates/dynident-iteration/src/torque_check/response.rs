@@ -2,12 +2,12 @@
 //! drives deliver another torque. And a robot that runs away is stopped before the log is long enough for a fit.
 //!
 //! * Exchanged joints and a reversed sign are detected within tenths of a second. In the log, the torque of joint i
-//! is the command of joint j, the command of joint i with the opposite sign, or the command of joint i up to a limit.
-//! If the log contains the commanded torque, the motion is used: the acceleration of joint i follows the torque of
-//! joint j without gravity, or decreases while the joint's own torque increases. Constants are free, so wrong masses
-//! have no effect.
+//!   is the command of joint j, the command of joint i with the opposite sign, or the command of joint i up to a limit.
+//!   If the log contains the commanded torque, the motion is used: the acceleration of joint i follows the torque of
+//!   joint j without gravity, or decreases while the joint's own torque increases. Constants are free, so wrong masses
+//!   have no effect.
 //! * Saturation: a model with limited torque, `clamp(τ_j, ±L) = W_j θ_j + friction`, fits the rows of joint j much
-//! better than the logged torque. θ_j is free, so no robot description is needed.
+//!   better than the logged torque. θ_j is free, so no robot description is needed.
 
 use super::command::LoggedMotion;
 use super::explanation::{JointData, friction_columns};

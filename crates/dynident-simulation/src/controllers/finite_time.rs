@@ -76,9 +76,9 @@ impl FiniteTimeSettings {
 /// `τ = M̂(q)(q̈_d + K_p Sig(e)^α₁ + K_d Sig(ė)^α₂) + Ĉ q̇ + ĝ`, `Sig(x)^α = |x|^α sign(x)`, `e = q_d - q`.
 ///
 /// This is Eq. 23 of the paper (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*)
-/// with two corrected signs and `α₂ = 2 α₁/(1 + α₁)`, which is misprinted there. With the printed signs and `e = q_d
-/// - q` the feedback is positive (see [`literal`](Self::literal)). With an exact model in continuous time the errors
-/// vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
+/// with two corrected signs and `α₂ = 2 α₁/(1 + α₁)`, which is misprinted there. With the printed signs and `e =
+/// q_d - q` the feedback is positive (see [`literal`](Self::literal)). With an exact model in continuous time the
+/// errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
 ///
 /// The gain `K_p |e|^(α-1)` is infinite at zero error, so that a sampled controller ends in a limit cycle of about
 /// `(K_p dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the line `ε^(α-1) x`, which is
