@@ -52,7 +52,7 @@ struct Common {
     /// Print one JSON object on standard output; messages go to standard error.
     #[arg(long, global = true)]
     json: bool,
-    /// Print only results and errors.
+    /// Print only problems and errors.
     #[arg(long, short, global = true)]
     quiet: bool,
     /// Number of threads; results are the same for any number. Default: number of processors.

@@ -1,6 +1,6 @@
 //! Recorded velocities, over which friction is fitted to the laws of simulators.
 
-/// A velocity of a joint, with the number of samples at this velocity.
+/// An interval of the velocity of a joint, represented by one velocity, with the number of its samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedVelocity {
     /// Velocity, rad/s (m/s), not zero.

@@ -230,7 +230,7 @@ pub struct UnmetConditionEntry {
     pub remedy: String,
 }
 
-/// One run.
+/// One run of an iteration: one motion of the robot with its log, its checks and the estimate after it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationRun {

@@ -176,7 +176,8 @@ impl ResultFile {
         Ok(())
     }
 
-    /// The base parameters of the physically consistent set, if there is one.
+    /// The base parameters of the physically consistent model, if the result contains one. `path` is that of the
+    /// result, for messages.
     ///
     /// # Errors
     /// Values that are not finite.

@@ -72,7 +72,8 @@ pub struct DefaultCase {
 }
 
 impl DefaultCase {
-    /// All settings in one line. It is the name of the case in messages, and the seed of its random numbers.
+    /// All settings of this case in one line: its name in messages. The seeds of its random numbers are computed from
+    /// it.
     pub fn label(&self) -> String {
         let Self { robot, motion, friction, noise, lag_s } = self;
         format!(

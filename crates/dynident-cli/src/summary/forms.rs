@@ -20,7 +20,7 @@ pub(super) fn forms(r: &ResultFile) -> String {
         let errors: Vec<String> = r.forms.iter().filter_map(of_form).collect();
         if !errors.is_empty() {
             let line = format!(
-                "error of exported files on [{}], with friction and drives fitted again for each form: {}",
+                "error of exported files on [{}]; terms that a format lacks are replaced: {}",
                 number + 1,
                 errors.join(", ")
             );

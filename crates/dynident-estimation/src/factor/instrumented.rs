@@ -113,7 +113,7 @@ impl InstrumentedProblem {
         &self.fallback
     }
 
-    /// The same rows without instruments, for least squares.
+    /// The rows of regressor and torque without the instruments, for least squares in place of instrumental variables.
     ///
     /// # Errors
     /// None in practice: construction already checks all conditions.

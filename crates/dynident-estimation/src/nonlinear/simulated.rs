@@ -86,7 +86,8 @@ impl SimulatedSettings {
     }
 }
 
-/// The record and the start of the iteration.
+/// Input of estimators that simulate the closed loop (DIDIM, CLIE, CLOE): the measured motion and torque, and the
+/// parameters with which the iteration of the estimator begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedProblem {
     /// Names of the parameters.

@@ -94,7 +94,7 @@ struct Phase {
 }
 
 impl SplicedLogistic {
-    /// Creates the family for a number of joints and a duration (s).
+    /// Creates the family of trajectories for a number of joints and a duration (s).
     ///
     /// # Errors
     /// Invalid settings; see [`SplicedLogisticSettings::validate`].

@@ -43,7 +43,7 @@ pub struct UnrestrictedFriction {
 impl JointFriction {
     /// Result for a joint that keeps its stated friction, with the reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
-        let chosen = format!("as the study states: {reason}");
+        let chosen = format!("as stated or by default: {reason}");
         Self {
             joint: joint.into(),
             chosen,

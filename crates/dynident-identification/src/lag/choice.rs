@@ -87,7 +87,11 @@ impl LagChoice {
                 let lag_s = taken_off();
                 format!("{}{bar} ms {} the motion at all joints, compensated", ms(lag_s.abs()), side(lag_s))
             }
-            LagKind::Joints => "different at each joint, compensated".to_owned(),
+            LagKind::Joints => {
+                let low = self.lag_s.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = self.lag_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                format!("{} to {} ms, different at each joint, compensated", ms(low), ms(high))
+            }
             LagKind::Stated => {
                 let is_one = self.lag_s.iter().all(|lag_s| *lag_s == taken_off());
                 let what = if is_one { format!("{} ms", ms(taken_off())) } else { "joint by joint".to_owned() };

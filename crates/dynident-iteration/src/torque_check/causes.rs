@@ -145,7 +145,7 @@ impl TorqueCause {
         }
     }
 
-    /// Whether the cause is known; otherwise another run may determine it.
+    /// Whether the cause of the wrong torque is known; otherwise another motion of the robot may determine it.
     pub fn is_determined(&self) -> bool {
         !matches!(self, Self::Undetermined { .. })
     }

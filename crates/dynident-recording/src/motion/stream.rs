@@ -223,7 +223,8 @@ impl MotionStream {
         Self { rows_in: self.rows_in.read_in_thread(), ..self }
     }
 
-    /// Omits the channels from the [`report`](Self::report), for passes that do not use them.
+    /// Omits statistics of the log's columns from the [`report`](Self::report). Computing them takes time, and a second
+    /// pass over the same log does not use them.
     #[must_use]
     pub fn without_channels(self) -> Self {
         Self { checks: Vec::new(), ..self }

@@ -74,7 +74,7 @@ impl<'a> RowBuilder<'a> {
         Ok(Self { maker, filter, panels: SamplePanels::default() })
     }
 
-    /// Adds a mask that drops invalid rows.
+    /// Adds a mask of rows of the regression; rows that it marks as invalid are not used.
     pub fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
         self.filter.mask = mask;
         self
@@ -95,7 +95,7 @@ impl<'a> RowBuilder<'a> {
         self.filter.filters.needed()
     }
 
-    /// Number of filtered rows of each joint so far, valid or not.
+    /// Number of rows of each joint that left the filter so far, including rows that the mask excludes.
     pub fn filtered_rows(&self) -> u64 {
         self.filter.filtered_rows
     }

@@ -77,10 +77,11 @@ impl IterationSection {
         }
     }
 
-    /// Checks the trajectories against the joints of the robot.
+    /// Checks the trajectories (legs) of the iteration against the joints of the robot.
     ///
     /// # Errors
-    /// Exclusive keys, unknown joints, a position that is not finite, or a leg without a moving joint.
+    /// Two keys that exclude each other, unknown joints, a position that is not finite, or a trajectory in which no
+    /// joint moves.
     pub fn check_legs(&self, robot: &StudyRobot) -> Result<(), StudyError> {
         let names = robot.parametric.joint_names();
         for (number, leg) in (1..).zip(&self.leg) {

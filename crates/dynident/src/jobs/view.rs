@@ -45,8 +45,8 @@ pub fn view_study(
     view_page(&study.title(), robot.model(), &appearance, &motions)
 }
 
-/// The report of a stored result, without the samples of its logs. Without a robot description, the bodies are capsules
-/// between the joints.
+/// The HTML report of a stored result, without the samples of its logs. `path` is that of the result, for messages.
+/// Without a robot description, the bodies are capsules between the joints.
 ///
 /// # Errors
 /// A model that cannot be read, if there is no robot description; [`Error::Report`], which indicates a bug.
