@@ -1,7 +1,6 @@
 //! Mass moments of a joint's subtree: first moment `h` and second moment Σ about the origin of the joint's inner
 //! frame. The mass is constant.
 
-use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Shift, Vec3};
@@ -17,8 +16,8 @@ impl<T: Scalar> CompositeMoments<T> {
     pub(crate) const ZERO: Self = Self { first: Vec3::ZERO, second: [T::ZERO; 6] };
 
     #[inline(always)]
-    pub(crate) fn own(bodies: impl Bodies<T>, index: usize) -> Self {
-        Self { first: bodies.first(index), second: bodies.second(index) }
+    pub(crate) fn own(step: &JointStep) -> Self {
+        Self { first: step.first.splat(), second: step.second.map(T::splat) }
     }
 
     #[inline(always)]
@@ -32,16 +31,10 @@ impl<T: Scalar> CompositeMoments<T> {
     /// Moments in the frame of the parent. If the parent rotates about an axis at rest, only `Σ_xx + Σ_yy` matters;
     /// it is stored in `Σ_xx`.
     #[inline(always)]
-    pub(crate) fn up(
-        &self,
-        step: &JointStep,
-        bodies: impl Bodies<T>,
-        hinges: PlacedHinges<'_, T>,
-        index: usize,
-    ) -> Self {
+    pub(crate) fn up(&self, step: &JointStep, hinges: PlacedHinges<'_, T>, index: usize) -> Self {
         let (first, second) =
             with_hinge!(hinges, *step, index, |hinge| (hinge.up(self.first), hinge.up_symmetric(&self.second)));
-        let moved = Self { first, second }.about_shifted(step, bodies, hinges.translation(step, index), index);
+        let moved = Self { first, second }.about_shifted(step, hinges.translation(step, index));
         if step.hang.on_resting_axis {
             let mut polar = Self::ZERO;
             polar.second[0] = moved.second[0] + moved.second[3];
@@ -54,11 +47,11 @@ impl<T: Scalar> CompositeMoments<T> {
     /// Moments about a point at `-t` from the origin: first moment `h + m t` and, with `g = h + m t/2`, second moment
     /// `Σ + t gᵀ + g tᵀ`.
     #[inline(always)]
-    fn about_shifted(self, step: &JointStep, bodies: impl Bodies<T>, t: Vec3<T>, index: usize) -> Self {
+    fn about_shifted(self, step: &JointStep, t: Vec3<T>) -> Self {
         let Self { first, second: s } = self;
         let (mut h, mut g) = (first, first);
-        if !bodies.is_massless(index) {
-            let mass = bodies.subtree_mass(index);
+        if step.subtree_mass != 0.0 {
+            let mass = T::splat(step.subtree_mass);
             h = t.scale_add(mass, first);
             g = t.scale_add(T::splat(0.5) * mass, first);
         }
@@ -94,27 +87,27 @@ impl<T: Scalar> CompositeMoments<T> {
 #[inline(always)]
 pub(crate) fn gathered<T: Scalar>(
     step: &JointStep,
-    bodies: impl Bodies<T>,
     index: usize,
     kept: &[CompositeMoments<T>],
     next: &CompositeMoments<T>,
 ) -> CompositeMoments<T> {
-    let mut all = if step.branches { kept[index] } else { CompositeMoments::own(bodies, index) };
+    let mut all = if step.branches { kept[index] } else { CompositeMoments::own(step) };
     if !step.is_tip {
         all.add(next);
     }
     all
 }
 
-/// Passes moments to the parent: in `next` if it is the previous body, else in memory.
+/// Passes the moments of joint `index` to its parent: in `next` if it is the previous body, else in memory.
 #[inline(always)]
 pub(crate) fn handed_on<T: Scalar>(
-    step: &JointStep,
-    bodies: impl Bodies<T>,
+    steps: &[JointStep],
+    index: usize,
     moved: CompositeMoments<T>,
     kept: &mut [CompositeMoments<T>],
     next: &mut CompositeMoments<T>,
 ) {
+    let step = &steps[index];
     if step.hang.follows {
         *next = moved;
         return;
@@ -122,7 +115,7 @@ pub(crate) fn handed_on<T: Scalar>(
     *next = CompositeMoments::ZERO;
     let Some(parent) = step.parent else { return };
     // A body adds its own moments together with those of its first child.
-    let mut sum = if step.hang.is_last_child { CompositeMoments::own(bodies, parent) } else { kept[parent] };
+    let mut sum = if step.hang.is_last_child { CompositeMoments::own(&steps[parent]) } else { kept[parent] };
     sum.add(&moved);
     kept[parent] = sum;
 }

@@ -1,6 +1,5 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
-use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, cross_shift, times_shift, with_hinge};
 use crate::sample_lanes::{put_lanes, take_lanes};
 use crate::states::{LinkMotion, LinkWrench};
@@ -120,22 +119,11 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
 /// Like [`newton_euler`], with hinges that are already placed.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let base = (-model.gravity()).splat();
-    newton_euler_of(model.steps(), model.steps(), base, scratch);
-}
-
-/// Like [`newton_euler_placed`], with given bodies and a given acceleration of the base (minus gravity).
-#[inline(always)]
-pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
-    steps: &[JointStep],
-    bodies: B,
-    base: Vec3<T>,
-    scratch: &mut CoreScratch<T>,
-) {
+    let steps = model.steps();
     let joints = steps.len();
     let hinges = scratch.hinges.placed(joints);
     let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
-    outward_of((steps, bodies, base), hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
+    outward(model, hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
     let tau = &mut scratch.tau[..joints];
     // Wrench on the next body if it is a child of this one; stays in registers.
     let mut next = LinkWrench::ZERO;
@@ -178,23 +166,9 @@ pub(crate) fn outward<T: Scalar>(
     dq: &[T],
     ddq: &[T],
 ) {
-    let base = (-model.gravity()).splat();
-    outward_of((model.steps(), model.steps(), base), hinges, motions, wrenches, dq, ddq);
-}
-
-/// Like [`outward`], with given bodies.
-#[inline(always)]
-fn outward_of<T: Scalar, B: Bodies<T>>(
-    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
-    hinges: PlacedHinges<'_, T>,
-    motions: &mut [LinkMotion<T>],
-    wrenches: &mut [LinkWrench<T>],
-    dq: &[T],
-    ddq: &[T],
-) {
     let joints = motions.len();
-    let (steps, wrenches, dq, ddq) = (&steps[..joints], &mut wrenches[..joints], &dq[..joints], &ddq[..joints]);
-    let base = LinkMotion { acceleration: base, ..LinkMotion::REST };
+    let (steps, wrenches, dq, ddq) = (&model.steps()[..joints], &mut wrenches[..joints], &dq[..joints], &ddq[..joints]);
+    let base = LinkMotion { acceleration: (-model.gravity()).splat(), ..LinkMotion::REST };
     // Motion of the previous body: along a chain it stays in registers.
     let mut motion = base;
     for index in 0..joints {
@@ -202,7 +176,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
         match step.parent {
             None if step.is_rotary => {
                 let arriving = with_hinge!(hinges, *step, index, |hinge| hinge.down(base.acceleration));
-                (motion, wrenches[index]) = about_resting_axis(bodies, index, arriving, dq[index], ddq[index]);
+                (motion, wrenches[index]) = about_resting_axis(step, arriving, dq[index], ddq[index]);
             }
             parent => {
                 if !step.hang.follows {
@@ -214,7 +188,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
                     [hinge.down(motion.omega), hinge.down(motion.alpha), hinge.down(origin)]
                 });
                 motion = moved(step, arriving, dq[index], ddq[index]);
-                wrenches[index] = wrench(step.is_rotary, bodies, index, &motion);
+                wrenches[index] = wrench(step, &motion);
             }
         }
         if step.branches {
@@ -227,8 +201,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
 /// and the only relevant part of its wrench, the moment about the axis.
 #[inline(always)]
 fn about_resting_axis<T: Scalar>(
-    bodies: impl Bodies<T>,
-    index: usize,
+    step: &JointStep,
     acceleration: Vec3<T>,
     dq: T,
     ddq: T,
@@ -236,7 +209,7 @@ fn about_resting_axis<T: Scalar>(
     let about = |rate: T| Vec3([T::ZERO, T::ZERO, rate]);
     let inward = -(dq * dq);
     let spin = Mat3([[inward, -ddq, T::ZERO], [ddq, inward, T::ZERO], [T::ZERO; 3]]);
-    let ([hx, hy, _], [xx, _, _, yy, ..]) = (bodies.first(index).0, bodies.second(index));
+    let ([hx, hy, _], [xx, _, _, yy, ..]) = (step.first.splat::<T>().0, step.second.map(T::splat));
     let moment = hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], (xx + yy) * ddq));
     let motion = LinkMotion { omega: about(dq), alpha: about(ddq), acceleration, spin };
     (motion, LinkWrench { force: Vec3::ZERO, moment: about(moment) })
@@ -271,11 +244,11 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> 
 /// Σ_y - Γ_y Σ_z` (y and z likewise) with the rows of Γ and Σ. Differences of Γ's diagonal entries are computed as
 /// sums that need no products.
 #[inline(always)]
-fn wrench<T: Scalar>(is_rotary: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
+fn wrench<T: Scalar>(step: &JointStep, motion: &LinkMotion<T>) -> LinkWrench<T> {
     let g = &motion.spin.0;
     let [ax, ay, az] = motion.acceleration.0;
-    let [hx, hy, hz] = bodies.first(index).0;
-    let [xx, xy, xz, yy, yz, zz] = bodies.second(index);
+    let [hx, hy, hz] = step.first.splat::<T>().0;
+    let [xx, xy, xz, yy, yz, zz] = step.second.map(T::splat);
     let (x, y, z) = (g[2][2] - g[1][1], g[0][0] - g[2][2], g[1][1] - g[0][0]);
     // Revolute bodies have no mass and no first and second moments along the axis: see JointStep.
     let mut f =
@@ -285,9 +258,9 @@ fn wrench<T: Scalar>(is_rotary: bool, bodies: impl Bodies<T>, index: usize, moti
     n.0[1] = g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, g[0][1].mul_add(yz, y.mul_add(xz, n[1]))));
     n.0[2] = g[1][2].mul_add(xz, g[1][0].mul_add(xx, z.mul_add(xy, n[2])));
     n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, n[2]));
-    if !is_rotary {
+    if !step.is_rotary {
         let along = Vec3([g[0][2], g[1][2], g[2][2]]);
-        f = motion.acceleration.scale_add(bodies.mass(index), along.scale_add(hz, f));
+        f = motion.acceleration.scale_add(T::splat(step.mass), along.scale_add(hz, f));
         n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));
         n.0[1] = g[0][2].mul_add(zz, hz.mul_add(ax, n[1]));
     }

@@ -47,7 +47,6 @@
 #![forbid(unsafe_code)]
 
 mod base_parameters;
-mod bodies;
 mod body_frames;
 mod columns;
 mod composite;

@@ -1,6 +1,5 @@
 //! The joint-space mass matrix: the composite-rigid-body algorithm.
 
-use crate::bodies::Bodies;
 use crate::columns::ColumnScratch;
 use crate::composite_moments::{CompositeMoments, gathered, handed_on};
 use crate::hinge::{BundledHinges, Hinge, cross_shift, with_hinge};
@@ -106,7 +105,7 @@ impl Kernel for Batch<'_> {
         for at in (0..samples).step_by(T::LANES) {
             take_lanes(&mut core.q, q, samples, at);
             core.hinges.place_below_base(model.steps(), &core.q);
-            composite_rigid_bodies(model.steps(), model.steps(), core, &mut out, at);
+            composite_rigid_bodies(model.steps(), core, &mut out, at);
         }
     }
 }
@@ -120,7 +119,7 @@ pub(crate) fn matrix_of_sample<T: Lane>(
     out: &mut [f64],
 ) {
     if T::PER_BUNDLE == 1 {
-        composite_rigid_bodies(model.steps(), model.steps(), core, &mut MatrixRows { out, stride: 1 }, 0);
+        composite_rigid_bodies(model.steps(), core, &mut MatrixRows { out, stride: 1 }, 0);
         return;
     }
     composite_rigid_bodies_in_bundles(model, core, columns);
@@ -138,9 +137,8 @@ pub(crate) fn matrix_of_sample<T: Lane>(
 /// joint. Its projection on the axis of every ancestor joint is an entry of the matrix. Columns, and moments along a
 /// chain, stay in registers.
 #[inline(always)]
-pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
+fn composite_rigid_bodies<T: Lane>(
     steps: &[JointStep],
-    bodies: B,
     core: &mut CoreScratch<T>,
     out: &mut MatrixRows<'_>,
     at: usize,
@@ -150,9 +148,9 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
     let mut next = CompositeMoments::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let moments = gathered(step, bodies, index, kept, &next);
+        let moments = gathered(step, index, kept, &next);
         let CompositeMoments { first: h, second: s } = &moments;
-        let diagonal = if step.is_rotary { s[0] + s[3] } else { bodies.subtree_mass(index) };
+        let diagonal = if step.is_rotary { s[0] + s[3] } else { T::splat(step.subtree_mass) };
         out.put(index * joints + index, at, diagonal);
         let (mut f, mut n) = if step.is_rotary {
             (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], diagonal]))
@@ -178,7 +176,7 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
             link = parent;
         }
         if step.parent.is_some() {
-            handed_on(step, bodies, moments.up(step, bodies, hinges, index), kept, &mut next);
+            handed_on(steps, index, moments.up(step, hinges, index), kept, &mut next);
         } else {
             next = CompositeMoments::ZERO;
         }
@@ -204,7 +202,7 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
     let mut next = CompositeMoments::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let moments = gathered(step, steps, index, kept, &next);
+        let moments = gathered(step, index, kept, &next);
         let CompositeMoments { first: h, second: s } = &moments;
         let (own, lane) = place[index];
         let (f, n) = (&mut force[own].0, &mut moment[own].0);
@@ -236,6 +234,6 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
                 *n = cross_shift(step.shift, translation, *f, hinge.up(*n));
             }
         });
-        handed_on(step, steps, moments.up(step, steps, hinges, index), kept, &mut next);
+        handed_on(steps, index, moments.up(step, hinges, index), kept, &mut next);
     }
 }
