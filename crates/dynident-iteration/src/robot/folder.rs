@@ -87,7 +87,6 @@ pub struct FolderRobot {
     /// Model for the torque check until a run provides one.
     prior: Option<ControllerModel>,
     joints: Vec<String>,
-    name: String,
 }
 
 impl FolderRobot {
@@ -98,9 +97,8 @@ impl FolderRobot {
     pub fn new(settings: FolderSettings, joints: Vec<String>) -> Result<Self, SimulationError> {
         let wait = settings.wait_s;
         require((0.0..=1e7).contains(&wait), "wait_s", wait, "give 0 to 1e7 s")?;
-        let name = settings.folder.display().to_string();
         let forms = settings.form_settings(joints.len())?;
-        Ok(Self { settings, forms, prior: None, joints, name })
+        Ok(Self { settings, forms, prior: None, joints })
     }
 
     /// Sets the model that predicts torques to check the unit of recorded torques, for a controller without a model.
@@ -232,14 +230,6 @@ fn breach_of_ways(request: &RunRequest<'_>, records: Option<&WayRecords>) -> Opt
 }
 
 impl Robot for FolderRobot {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn joints(&self) -> &[String] {
-        &self.joints
-    }
-
     fn has_corrected_log(&self, folder_name: &str, reference: &Reference, kept: &Record) -> bool {
         let path = self.settings.folder.join(folder_name).join("log.csv");
         // A missing or incomplete file is not a correction.

@@ -271,14 +271,6 @@ impl<F> Robot for FunctionRobot<F>
 where
     F: FnMut(ControlledRun) -> (ControlledRun, Result<(), FunctionStop>),
 {
-    fn name(&self) -> &'static str {
-        "function"
-    }
-
-    fn joints(&self) -> &[String] {
-        &self.joints
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         let (run, result) = (self.function)(ControlledRun::new(request, &self.joints)?);
         Ok(run.ended(result))

@@ -492,15 +492,9 @@ pub enum RobotFault {
 
 /// A robot: the interface between an experiment and the robot, real or simulated.
 pub trait Robot: core::fmt::Debug {
-    /// Name of the robot, for messages.
-    fn name(&self) -> &str;
-
-    /// Names of the joints, in the model's order.
-    fn joints(&self) -> &[String];
-
-    /// Whether a person has corrected the log of a run since it was read. `folder_name` is the folder name of the
-    /// run's request ([`RunRequest::folder_name`]), `kept` the stored record along `reference`. Only a robot whose
-    /// logs come from a person can return true; the corrected log is then evaluated again.
+    /// Whether a person has corrected the log of a run since it was read. `folder_name` is that of its request
+    /// ([`RunRequest::folder_name`]), `kept` the stored record along `reference`. Only a robot with logs from a person
+    /// may return true; the corrected log is then evaluated again.
     fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
         false
     }

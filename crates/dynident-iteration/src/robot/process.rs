@@ -77,14 +77,6 @@ impl ProcessRobot {
 }
 
 impl Robot for ProcessRobot {
-    fn name(&self) -> &str {
-        self.program.name()
-    }
-
-    fn joints(&self) -> &[String] {
-        &self.joints
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
         let mut recorder = Recorder::new(request, &self.joints);

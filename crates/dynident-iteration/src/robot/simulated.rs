@@ -31,22 +31,9 @@ impl SimulatedRobot {
     pub fn with_locked(self, joints: &[String]) -> Result<Self, SimulationError> {
         Ok(Self { plant: self.plant.with_locked(joints)?, ..self })
     }
-
-    /// The simulated robot.
-    pub fn plant(&self) -> &Plant {
-        &self.plant
-    }
 }
 
 impl Robot for SimulatedRobot {
-    fn name(&self) -> &'static str {
-        "simulator"
-    }
-
-    fn joints(&self) -> &[String] {
-        &self.joints
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
         let mut controller = request.controller.build(self.joints.len(), request.model)?;

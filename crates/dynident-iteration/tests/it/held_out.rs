@@ -50,14 +50,6 @@ impl Noted {
 }
 
 impl Robot for Noted {
-    fn name(&self) -> &'static str {
-        "noted"
-    }
-
-    fn joints(&self) -> &[String] {
-        self.inner.joints()
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         self.commanded.push((request.run, request.purpose));
         let is_held_out = request.purpose == RunPurpose::HeldOut;

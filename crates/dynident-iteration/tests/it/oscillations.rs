@@ -148,14 +148,6 @@ fn derived_gains_bear_a_light_joint() {
 struct Chattering(SimulatedRobot);
 
 impl Robot for Chattering {
-    fn name(&self) -> &'static str {
-        "chattering"
-    }
-
-    fn joints(&self) -> &[String] {
-        self.0.joints()
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         let mut run = self.0.run(request)?;
         let of = run.record.of(1);

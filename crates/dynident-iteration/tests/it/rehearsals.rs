@@ -34,14 +34,6 @@ impl Noted {
 }
 
 impl Robot for Noted {
-    fn name(&self) -> &'static str {
-        "noted"
-    }
-
-    fn joints(&self) -> &[String] {
-        self.inner.joints()
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         self.motions.push((request.speed, request.reference.duration_s()));
         self.inner.run(request)

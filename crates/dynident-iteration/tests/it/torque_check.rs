@@ -22,14 +22,6 @@ impl core::fmt::Debug for Faulty<'_> {
 }
 
 impl Robot for Faulty<'_> {
-    fn name(&self) -> &'static str {
-        "faulty"
-    }
-
-    fn joints(&self) -> &[String] {
-        self.inner.joints()
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         let mut run = self.inner.run(request)?;
         (self.fault)(&mut run.record);

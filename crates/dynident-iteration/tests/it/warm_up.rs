@@ -9,7 +9,6 @@ use dynident_simulation::{SensorSettings, SimulationError};
 #[derive(Debug)]
 struct Cold {
     coulomb: [f64; 2],
-    inner: SimulatedRobot,
     commanded: Vec<(usize, RunPurpose, f64)>,
     stops_in: Option<usize>,
 }
@@ -20,19 +19,11 @@ fn arm(coulomb: [f64; 2]) -> SimulatedRobot {
 
 impl Cold {
     fn new() -> Self {
-        Self { coulomb: [3.0, 2.0], inner: arm([3.0, 2.0]), commanded: Vec::new(), stops_in: None }
+        Self { coulomb: [3.0, 2.0], commanded: Vec::new(), stops_in: None }
     }
 }
 
 impl Robot for Cold {
-    fn name(&self) -> &'static str {
-        "cold"
-    }
-
-    fn joints(&self) -> &[String] {
-        self.inner.joints()
-    }
-
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         self.commanded.push((request.run, request.purpose, request.speed));
         let mut run = arm(self.coulomb).run(request)?;
