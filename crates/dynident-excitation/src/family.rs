@@ -22,8 +22,10 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// Number of free parameters of all joints.
     fn parameters(&self) -> usize;
 
-    /// Lower and upper bound of each parameter that the family requires (not the robot); infinite if unbounded.
-    fn bounds(&self) -> Vec<[f64; 2]>;
+    /// Lower and upper bound of each parameter required by the family (not by the robot); infinite without bound.
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        vec![[f64::NEG_INFINITY, f64::INFINITY]; self.parameters()]
+    }
 
     /// Random start of suitable size for joints with the given position range `[lower, upper]` and velocity limit,
     /// inside [`bounds`](Family::bounds).

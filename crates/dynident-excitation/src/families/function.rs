@@ -182,10 +182,6 @@ impl Family for FunctionFamily {
         self.joints * self.parameters
     }
 
-    fn bounds(&self) -> Vec<[f64; 2]> {
-        vec![[f64::NEG_INFINITY, f64::INFINITY]; Family::parameters(self)]
-    }
-
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut parameters: Vec<f64> = (0..Family::parameters(self)).map(|_| random.normal()).collect();
         let Some(standing) = self.linear.as_ref().and_then(|linear| linear.standing.as_ref()) else {

@@ -92,10 +92,6 @@ impl Family for SampledMotion {
         0
     }
 
-    fn bounds(&self) -> Vec<[f64; 2]> {
-        Vec::new()
-    }
-
     fn random(&self, _ranges: &[[f64; 2]], _speeds: &[f64], _random: &mut Random) -> Vec<f64> {
         Vec::new()
     }

@@ -89,10 +89,6 @@ impl<B: Basis> Family for LinearFamily<B> {
         self.joints * self.basis.columns()
     }
 
-    fn bounds(&self) -> Vec<[f64; 2]> {
-        vec![[f64::NEG_INFINITY, f64::INFINITY]; self.parameters()]
-    }
-
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut parameters: Vec<f64> = (0..self.joints).flat_map(|_| self.basis.shape(random)).collect();
         let mut motion = Motion::default();
