@@ -194,7 +194,8 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
     let noise = sigma.iter().zip(colours).map(|(&std, autoregression)| ChannelNoise { std, autoregression });
     let noise = noise.collect();
     let problem = rows.eliminated(names, channels, &sigma, &residuals, &unknowns)?;
-    let estimate = estimate_of(&problem, settings, sigma, iterations, converged)?;
+    let estimate =
+        estimate_without_motion(&problem, &settings.rank, settings.covariance, sigma, iterations, converged)?;
     Ok(SimultaneousEstimate { estimate, motion: unknowns.as_slice()[..motion].to_vec(), noise })
 }
 
@@ -228,10 +229,11 @@ fn descended<M: SimultaneousModel>(
     Ok(None)
 }
 
-/// Estimates the parameters from rows without the motion; `sigma` is the noise of the channels.
-fn estimate_of(
+/// Estimates the parameters from rows without the motion, with noise `sigma` of the channels.
+pub(super) fn estimate_without_motion(
     problem: &LinearProblem,
-    settings: &SimultaneousSettings,
+    rank: &RankSettings,
+    covariance: CovarianceMethod,
     sigma: Vec<f64>,
     iterations: usize,
     converged: bool,
@@ -239,9 +241,9 @@ fn estimate_of(
     let stacked = problem.stacked();
     let weights: Vec<f64> = sigma.iter().map(|sigma| 1.0 / sigma).collect();
     let triangle = stacked.combined(&weights)?;
-    let choice = split(&triangle, &settings.rank, problem.unexcited());
+    let choice = split(&triangle, rank, problem.unexcited());
     joint_degrees_of_freedom(&stacked, choice.free.len())?;
-    let solution = solve(&triangle, &choice, &settings.rank, problem.fallback());
+    let solution = solve(&triangle, &choice, rank, problem.fallback());
     PointEstimate {
         triangle,
         split: choice,
@@ -252,7 +254,7 @@ fn estimate_of(
         iterations,
         converged,
     }
-    .into_estimate(&stacked, &settings.rank, settings.covariance)
+    .into_estimate(&stacked, rank, covariance)
 }
 
 /// Cramér-Rao bound of the parameters' covariance with unknown motion: the parameters' block of `(Σ_c X_cᵀ A_cᵀ A_c

@@ -7,8 +7,9 @@ use super::problem::{SplineMotionProblem, SplineMotionSettings, TorqueModel};
 use super::rows::{FreeParameters, Piece};
 use super::system::{System, torque_information};
 use crate::error::EstimationError;
-use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor, solve, split};
-use crate::uncertainty::{Estimate, PointEstimate, joint_degrees_of_freedom};
+use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor};
+use crate::nonlinear::simultaneous::estimate_without_motion;
+use crate::uncertainty::Estimate;
 use rayon::prelude::*;
 
 /// Estimate from the last linearisation: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, positions and motion prior;
@@ -62,23 +63,8 @@ pub(super) fn estimate_of<M: TorqueModel>(
             }
         }
     }
-    let stacked = linear.stacked();
-    let weights = vec![1.0; linear.joints().len()];
-    let triangle = stacked.combined(&weights)?;
-    let choice = split(&triangle, &settings.rank, linear.unexcited());
-    joint_degrees_of_freedom(&stacked, choice.free.len())?;
-    let solution = solve(&triangle, &choice, &settings.rank, linear.fallback());
-    let estimate = PointEstimate {
-        triangle,
-        split: choice,
-        solution,
-        joint_sigma: vec![1.0; weights.len()],
-        weights,
-        weighted_variance: 1.0,
-        iterations,
-        converged,
-    };
-    Ok(estimate.into_estimate(&stacked, &settings.rank, settings.covariance)?)
+    let sigma = vec![1.0; linear.joints().len()];
+    Ok(estimate_without_motion(&linear, &settings.rank, settings.covariance, sigma, iterations, converged)?)
 }
 
 /// Rows `[X̃ | r + X̃ θ]`, one after another.
