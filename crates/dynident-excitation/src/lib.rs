@@ -8,7 +8,7 @@
 //! | choose the optimality criterion | a [`Criterion`](criteria::Criterion) of [`criteria`]: D-, A-, E-optimal, prediction |
 //! | find the best motion | [`design()`], or [`design_without_gradients()`] for comparison |
 //! | check all limits independently | [`check::check_limits`], which shares no code with the search |
-//! | find why no motion keeps the limits | [`limits::diagnose()`] |
+//! | find why no motion keeps the limits | [`limits::diagnose_until()`] |
 //! | predict the error bars | [`Information`] of the motion, [`predicted_covariance()`] of every parameter |
 //! | move one joint after another | [`step_wise`]: a short motion of each joint in its own time window |
 //! | export the motion to a robot | [`export`]: CSV, ROS 2, URScript |

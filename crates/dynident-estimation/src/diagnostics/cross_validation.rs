@@ -223,13 +223,8 @@ fn all_but_one(own: &[TriangularFactor], columns: usize) -> Vec<TriangularFactor
 }
 
 impl JointFolds {
-    /// The columns to choose from, as given.
-    pub fn variable(&self) -> &[usize] {
-        &self.variable
-    }
-
-    /// Variance inflation factor of a combination `a` of candidate columns, given as (place in
-    /// [`variable`](Self::variable), factor): `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that the common
+    /// Variance inflation factor of a combination `a` of candidate columns, given as (place among
+    /// the candidate columns, factor): `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that the common
     /// columns and the combinations `others` explain over all rows. It is 1 if they explain nothing and infinite if
     /// they explain everything.
     ///

@@ -255,20 +255,12 @@ impl TriangularFactor {
     /// # Errors
     /// [`EstimationError::Mismatch`] if the numbers of columns differ.
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimationError> {
-        self.merge_with(&mut FactorWorkspace::default(), other)
-    }
-
-    /// Like [`merge`](Self::merge), without allocation once the workspace is large enough.
-    ///
-    /// # Errors
-    /// Same as for [`merge`](Self::merge).
-    pub fn merge_with(&mut self, workspace: &mut FactorWorkspace, other: &Self) -> Result<(), EstimationError> {
         expect("columns of merged factors", self.columns, other.columns)?;
-        self.absorb_factor(workspace, other);
+        self.absorb_factor(&mut FactorWorkspace::default(), other);
         Ok(())
     }
 
-    /// Like [`merge`](Self::merge), without the check of columns.
+    /// [`merge`](Self::merge) without the check of columns, and without allocation once the workspace is large enough.
     pub(crate) fn absorb_factor(&mut self, workspace: &mut FactorWorkspace, other: &Self) {
         if self.rows == 0 {
             self.clone_from(other);

@@ -4,7 +4,7 @@ use super::projection::Projection;
 use super::weighted::{WeightedSettings, noise_change, noise_of_joints};
 use crate::error::{EstimationError, require};
 use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, Split, TriangularFactor, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus, PointEstimate, joint_degrees_of_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -156,13 +156,6 @@ pub fn instrumental_variables(
     }
     .into_estimate(&second, &settings.rank, settings.covariance)?;
     Ok(InstrumentalEstimate { estimate, instruments })
-}
-
-impl InstrumentalEstimate {
-    /// Whether all columns were estimated with strong instruments.
-    pub fn sound(&self) -> bool {
-        self.estimate.status == EstimateStatus::Complete && !self.instruments.weak
-    }
 }
 
 /// Free columns that the instruments do not explain completely.

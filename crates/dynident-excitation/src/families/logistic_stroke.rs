@@ -33,11 +33,6 @@ impl LogisticStroke {
     /// Minimum κ, above which the velocity has a single peak in the middle.
     pub const LEAST_SHARPNESS: f64 = 3.464_101_615_137_755;
 
-    /// Steepness ω = κ/w, 1/s.
-    pub fn omega(&self) -> f64 {
-        self.sharpness / self.half_duration_s
-    }
-
     /// Normalised time u, limited to the range in which the stroke moves.
     pub(super) fn warped(&self, time_s: f64) -> f64 {
         ((time_s - self.centre_s) / self.half_duration_s).clamp(-MAX_WARP, MAX_WARP)

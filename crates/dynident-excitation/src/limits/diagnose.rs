@@ -45,14 +45,8 @@ pub(crate) fn relaxation(set: &LimitSet, widened: &[Widened]) -> Option<Relaxati
 /// torque does not change. The smallest s is found by bisection on the constraint values. Slower motion cannot
 /// correct a gravity torque above a limit, or a violated limit of position, place or distance.
 ///
-/// # Panics
-/// If the number of times differs from the number of samples.
-pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
-    diagnose_until(set, times_s, motion, &|| false)
-}
-
-/// Like [`diagnose()`], but stops searching for changes when `stop` returns true. The result contains all violated
-/// limits and the changes found until then.
+/// The search for changes ends when `stop` returns true. The result then contains all violated limits and the changes
+/// found so far.
 ///
 /// # Panics
 /// If the number of times differs from the number of samples.

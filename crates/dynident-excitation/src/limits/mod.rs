@@ -1,10 +1,10 @@
 //! **Limits of the motion**: the user's description, values and derivatives for optimisers, and a diagnosis of
 //! infeasible motions.
 //!
-//! [`Limits`] is the user's description. [`LimitSet`] prepares it for a robot: normalised constraint values `c <= 0`
-//! over a block of samples, and the adjoint from multipliers to the motion. [`peaks()`] finds the extremes between
-//! samples. [`diagnose()`] reports violated limits and sufficient changes. The independent [`check`](crate::check)
-//! shares none of this code.
+//! [`Limits`] is the user's description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block
+//! of samples, and the adjoint from multipliers to the motion. [`peaks()`] finds the extremes between samples, and
+//! [`diagnose_until()`] reports violated limits and sufficient changes. The independent [`check`](crate::check) shares none
+//! of this code.
 
 mod assumed;
 mod combined;
@@ -45,7 +45,7 @@ pub use assumed::{
     AssumedLimits, AssumptionThresholds, CAPSULE_RADIUS_SHARE, LimitsInForce, ShapesOfLinks, StartPositions,
 };
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits};
-pub use diagnose::{Diagnosis, diagnose, diagnose_until};
+pub use diagnose::{Diagnosis, diagnose_until};
 pub(crate) use diagnose::{Widened, relaxation};
 pub use error::LimitError;
 pub use kind::{Constraint, LimitKind};

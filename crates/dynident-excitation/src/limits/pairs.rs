@@ -113,14 +113,6 @@ impl SelfCollision {
         }
         Ok(resolved)
     }
-
-    /// Pairs of links that are not checked although they are not adjacent, because their shapes overlap.
-    ///
-    /// # Errors
-    /// Errors of [`validate`](SelfCollision::validate).
-    pub fn left_out(&self, model: &Model) -> Result<Vec<[String; 2]>, LimitError> {
-        Ok(self.resolve(model)?.left_out)
-    }
 }
 
 impl SolidPairs {

@@ -5,7 +5,7 @@ use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{
     BoxLimit, ColumnLimit, JointLimit, LimitError, LimitKind, LimitSet, Limits, LinkCapsule, LinkPoint, Relaxation,
-    SelfCollision, diagnose,
+    SelfCollision, diagnose_until,
 };
 use dynident_model::sample::{Random, planar_2r};
 use dynident_model::{Body, InertialParameters, Link, Mat3, Model, Transform, Vec3};
@@ -145,7 +145,7 @@ fn too_fast_a_path_gives_its_smallest_stretch() {
     let (model, times, motion) = swing(0.5, 4.0, 0.0);
     // Peaks: velocity 2, acceleration 8. The velocity needs 2 / 1.6 = 1.25, the acceleration √(8 / 4.5) = 4/3.
     let limits = first_joint(&JointLimit { speed: Some(1.6), acceleration: Some(4.5), ..JointLimit::default() });
-    let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
+    let diagnosis = diagnose_until(&LimitSet::new(&limits, &model).unwrap(), &times, &motion, &|| false);
     assert_eq!(diagnosis.broken.len(), 2);
     let [Relaxation::Stretch { factor, duration_s }] = diagnosis.relaxations[..] else { panic!("{diagnosis:?}") };
     // 1 kHz samples of sin(4t) miss its peak by at most (4e-3 / 2)² / 2, and the stretch by the root of that.
@@ -158,7 +158,7 @@ fn too_fast_a_path_gives_its_smallest_stretch() {
 fn a_single_violated_kind_gives_the_sufficient_limit() {
     let (model, times, motion) = swing(0.5, 4.0, 0.7);
     let limits = first_joint(&JointLimit { position: Some([-1.0, 1.0]), ..JointLimit::default() });
-    let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
+    let diagnosis = diagnose_until(&LimitSet::new(&limits, &model).unwrap(), &times, &motion, &|| false);
     let [Relaxation::Limits { kind: LimitKind::Position, changes }] = &diagnosis.relaxations[..] else {
         panic!("a slower run does not fix a position: {diagnosis:?}")
     };
@@ -173,7 +173,7 @@ fn a_stretch_leaves_gravity() {
     let (model, times, motion) = swing(0.5, 8.0, -core::f64::consts::FRAC_PI_2);
     let limits = first_joint(&JointLimit { torque: Some(20.0), ..JointLimit::default() });
     let set = LimitSet::new(&limits, &model).unwrap();
-    let diagnosis = diagnose(&set, &times, &motion);
+    let diagnosis = diagnose_until(&set, &times, &motion, &|| false);
     let factor = diagnosis.relaxations.iter().find_map(|relaxation| match relaxation {
         Relaxation::Stretch { factor, .. } => Some(*factor),
         _ => None,
@@ -195,7 +195,7 @@ fn a_stretch_leaves_gravity() {
     // Held horizontally, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) violates 10 Nm at any velocity.
     let (model, times, motion) = swing(0.2, 8.0, 0.0);
     let limits = first_joint(&JointLimit { torque: Some(10.0), position: Some([-0.1, 0.1]), ..JointLimit::default() });
-    let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
+    let diagnosis = diagnose_until(&LimitSet::new(&limits, &model).unwrap(), &times, &motion, &|| false);
     let [Relaxation::Combined { factor, changes, .. }] = &diagnosis.relaxations[..] else {
         panic!("neither a slower run nor one kind of limit alone fixes both: {diagnosis:?}")
     };

@@ -20,9 +20,6 @@ pub enum RunPart {
 }
 
 impl RunPart {
-    /// All parts, in order.
-    pub const ALL: [Self; 3] = [Self::Approach, Self::Motion, Self::Return];
-
     #[allow(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
     pub(crate) fn is_motion(&self) -> bool {
         *self == Self::Motion
