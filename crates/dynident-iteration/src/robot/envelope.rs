@@ -1,5 +1,4 @@
-use super::stop_reason::{Breach, EnvelopeQuantity};
-use super::ways::RunPart;
+use super::stop_reason::{Breach, EnvelopeQuantity, SampleBreach};
 use super::workspace::{WorkspaceBox, WorkspaceSettings};
 use dynident_dynamics::Workspace as Arrays;
 use dynident_model::Model;
@@ -164,8 +163,8 @@ impl Envelope {
             let time_s = sample as f64 / reference.rate_hz();
             (0..motion.joints).find_map(|joint| {
                 let at = joint * motion.samples + sample;
-                let place = self.of_position(joint, motion.q[at]);
-                place.or_else(|| self.of_speed(joint, motion.dq[at])).map(|broken| broken.breach(names, time_s))
+                let place = self.of_position(names, joint, motion.q[at]);
+                place.or_else(|| self.of_speed(names, joint, motion.dq[at])).map(|broken| broken.breach(time_s))
             })
         });
         of_joints.or_else(|| outside.map(|(sample, own)| own.breach(sample as f64 / reference.rate_hz())))
@@ -178,43 +177,34 @@ impl Envelope {
 
     /// Returns the violation of the torque limits, if any.
     pub fn torque_breach(&self, tau: &[f64], names: &[String], time_s: f64) -> Option<Breach> {
-        (0..tau.len()).find_map(|joint| Some(self.of_torque(joint, tau[joint])?.breach(names, time_s)))
+        (0..tau.len()).find_map(|joint| Some(self.of_torque(names, joint, tau[joint])?.breach(time_s)))
     }
 
-    fn of_position(&self, joint: usize, q: f64) -> Option<Broken> {
+    fn of_position(&self, names: &[String], joint: usize, q: f64) -> Option<SampleBreach> {
         let lower = self.lower[joint].filter(|limit| q < *limit);
         let upper = self.upper[joint].filter(|limit| q > *limit);
         let limit = lower.or(upper)?;
-        Some(Broken { joint, quantity: EnvelopeQuantity::Position, value: q, limit })
+        Some(SampleBreach { name: names[joint].clone(), quantity: EnvelopeQuantity::Position, value: q, limit })
     }
 
-    fn of_speed(&self, joint: usize, dq: f64) -> Option<Broken> {
+    fn of_speed(&self, names: &[String], joint: usize, dq: f64) -> Option<SampleBreach> {
         let limit = self.speed[joint].filter(|limit| dq.abs() > *limit)?;
-        Some(Broken { joint, quantity: EnvelopeQuantity::Speed, value: dq, limit })
+        Some(SampleBreach { name: names[joint].clone(), quantity: EnvelopeQuantity::Speed, value: dq, limit })
     }
 
-    fn of_torque(&self, joint: usize, tau: f64) -> Option<Broken> {
+    fn of_torque(&self, names: &[String], joint: usize, tau: f64) -> Option<SampleBreach> {
         let limit = self.torque[joint].filter(|limit| tau.abs() > *limit)?;
-        Some(Broken { joint, quantity: EnvelopeQuantity::Torque, value: tau, limit })
+        Some(SampleBreach { name: names[joint].clone(), quantity: EnvelopeQuantity::Torque, value: tau, limit })
     }
 
-    fn of_error(&self, joint: usize, error: f64) -> Option<Broken> {
+    fn of_error(&self, names: &[String], joint: usize, error: f64) -> Option<SampleBreach> {
         let limit = self.tracking_error[joint].filter(|limit| error.abs() > *limit)?;
-        Some(Broken { joint, quantity: EnvelopeQuantity::TrackingError, value: error, limit })
-    }
-}
-
-struct Broken {
-    joint: usize,
-    quantity: EnvelopeQuantity,
-    value: f64,
-    limit: f64,
-}
-
-impl Broken {
-    fn breach(self, names: &[String], time_s: f64) -> Breach {
-        let Self { joint, quantity, value, limit } = self;
-        Breach { joint: names[joint].clone(), quantity, value, limit, time_s, part: RunPart::Motion }
+        Some(SampleBreach {
+            name: names[joint].clone(),
+            quantity: EnvelopeQuantity::TrackingError,
+            value: error,
+            limit,
+        })
     }
 }
 
@@ -248,7 +238,8 @@ impl<'a> EnvelopeWatch<'a> {
     /// sample-major; `dq` are measured velocities, if available.
     pub(super) fn look(&mut self, record: &Record, dq: Option<&[f64]>) -> Option<Breach> {
         let envelope = self.envelope?;
-        let (joints, last) = (record.joints.len(), record.samples.checked_sub(1)?);
+        let (names, joints) = (&record.joints, record.joints.len());
+        let last = record.samples.checked_sub(1)?;
         let time_s = record.times_s[last];
         while self.from + 1 < last && time_s - record.times_s[self.from + 1] >= envelope.speed_span_s {
             self.from += 1;
@@ -262,12 +253,12 @@ impl<'a> EnvelopeWatch<'a> {
                 None => (span_s >= envelope.speed_span_s).then(|| (q - record.q[self.from * joints + joint]) / span_s),
             };
             let broken = envelope
-                .of_position(joint, q)
-                .or_else(|| envelope.of_error(joint, target_at(self.reference, joint, time_s) - q))
-                .or_else(|| envelope.of_speed(joint, speed?))
-                .or_else(|| envelope.of_torque(joint, record.tau[at]));
+                .of_position(names, joint, q)
+                .or_else(|| envelope.of_error(names, joint, target_at(self.reference, joint, time_s) - q))
+                .or_else(|| envelope.of_speed(names, joint, speed?))
+                .or_else(|| envelope.of_torque(names, joint, record.tau[at]));
             if let Some(broken) = broken {
-                return Some(broken.breach(&record.joints, time_s));
+                return Some(broken.breach(time_s));
             }
         }
         let (own, arrays) = (envelope.workspace.as_ref()?, self.arrays.as_mut()?);
