@@ -3,8 +3,8 @@
 //!
 //! [`Limits`] is the user's description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block
 //! of samples, and the adjoint from multipliers to the motion. [`peaks()`] finds the extremes between samples, and
-//! [`diagnose_until()`] reports violated limits and sufficient changes. The independent [`check`](crate::check) shares none
-//! of this code.
+//! [`diagnose_until()`] reports violated limits and sufficient changes. The independent [`check`](crate::check) shares
+//! none of this code.
 
 mod assumed;
 mod combined;
