@@ -33,9 +33,9 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
     text
 }
 
-/// Ratio of the residuals at reversals to those of fast motion from which the friction law is named as the cause: in
-/// 128 simulated studies with the right law (benchmarks/changes.py) it was 0.5 to 1.5, and 2.2 with joints that stick at
-/// each reversal.
+/// Ratio of the residuals at reversals to those of fast motion from which a likely cause is named. In 128 simulated
+/// studies with the right friction law (`benchmarks/changes.py`) the ratio was 0.5 to 1.5, in one with joints that stick
+/// at each reversal 2.2.
 const LARGE_REVERSAL_RATIO: f64 = 2.0;
 
 /// The properties of a held-out log's residuals in one line.
@@ -55,7 +55,7 @@ pub(super) fn residuals(log: &LogValidation) -> String {
         String::new()
     } else {
         let ratio = mean(&ratios);
-        let cause = if ratio >= LARGE_REVERSAL_RATIO { " (friction near standstill differs from the law)" } else { "" };
+        let cause = if ratio >= LARGE_REVERSAL_RATIO { " (usually friction near standstill)" } else { "" };
         format!(", at reversals {ratio:.2} times those of fast motion{cause}")
     };
     let covered: Vec<f64> =
