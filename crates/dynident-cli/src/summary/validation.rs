@@ -34,8 +34,8 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
 }
 
 /// Ratio of the residuals at reversals to those of fast motion from which a likely cause is named. In 128 simulated
-/// studies with the right friction law (`benchmarks/changes.py`) the ratio was 0.5 to 1.5, in one with joints that stick
-/// at each reversal 2.2.
+/// studies with the right friction law (`benchmarks/changes.py`) the ratio was 0.5 to 1.5, in one with joints that
+/// stick at each reversal 2.2.
 const LARGE_REVERSAL_RATIO: f64 = 2.0;
 
 /// The properties of a held-out log's residuals in one line.
