@@ -55,8 +55,8 @@ pub struct DesignSettings {
     /// Maximum number of evaluations of a start or restart. Default 1,000. For condition numbers 600 per start and
     /// 500 per restart; 2,000 for condition numbers with 24 or more parameters per joint.
     pub evaluations_per_start: Option<usize>,
-    /// Maximum number of evaluations of a polish (final descent on a fine grid). At most six more polishes follow
-    /// while a limit is violated between samples. Default 1,000.
+    /// Maximum number of evaluations of a polish (final descent on a fine grid). At most six polishes follow the
+    /// search, while a limit is violated between samples. Default 1,000.
     pub polish_evaluations: usize,
     /// Number of samples of the search grid. Default 96 (64 for condition numbers and linear families), but at least
     /// five per free parameter of a joint, for families that move fast. With place limits at least 12.5 samples per

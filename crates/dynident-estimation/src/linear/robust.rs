@@ -88,7 +88,8 @@ pub struct RobustSettings {
     pub rank: RankSettings,
     /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// The iteration ends when no value changes by more than this share of its error bar. Default 1e-4.
+    /// The iteration ends at this change of the estimate in error bars (root mean square over all directions) and this
+    /// relative change of every scale. Default 1e-4.
     pub tolerance: f64,
     /// Maximum number of passes over the rows. Default 50.
     pub max_passes: usize,

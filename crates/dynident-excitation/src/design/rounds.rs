@@ -10,8 +10,9 @@ use crate::optimisers::{
 use core::ops::ControlFlow;
 
 /// First penalty of a limit, as a share of the criterion's scale. It is low, so that a start first finds a good
-/// motion slightly outside the limits and then moves inside. On three arms with five harmonics and ten starts each,
-/// 0.02 with slow growth gives a log det that is 2 to 4 higher than with fast growth.
+/// motion slightly outside the limits and then moves inside. On three arms with five harmonics and ten starts each, a
+/// first penalty of 0.02 with slow growth gives a log det that is 2 to 4 higher than a first penalty of 2 with fast
+/// growth.
 const FIRST_PENALTY: f64 = 0.02;
 /// First penalty for tasks with place limits. With 0.02 a start moves further into obstacles, and more starts fail
 /// (UR10 above a table next to a column).

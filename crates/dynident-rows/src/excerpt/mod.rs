@@ -17,8 +17,8 @@ use dynident_recording::{
 };
 use pieces::Pieces;
 
-/// Largest total number of training rows that are used without an excerpt; also the size of excerpts. At 1 kHz it is
-/// about three minutes, several times the length of the public recordings.
+/// Largest total number of training rows that are used without an excerpt; also the maximum size of an excerpt. At
+/// 1 kHz this is about three minutes, several times the length of the public recordings.
 const MAX_TOTAL_ROWS: u64 = 200_000;
 /// Minimum number of samples of an excerpt per period of the positions' cut-off frequency. The change of friction at a
 /// reversal is much shorter than this period: with 100 samples, the Stribeck effect of a simulated arm was no longer
