@@ -1,8 +1,8 @@
 //! Reduction of logs to triangular factors, for fits to many logs that may be stored at different places.
 //!
-//! [`reduce`] converts each log to triangular factors. [`identify_reduced`] fits the model to these factors with the
-//! same result as [`identify`](crate::identify()) from the logs. The samples are not read again, so the settings must
-//! state cut-off, drive inertia and friction, and the estimator must be least squares.
+//! [`reduce`] converts each log to triangular factors. [`identify_reduced`] fits the model to these factors only,
+//! with the same parameters as [`identify`](crate::identify()) from the logs. The samples are not read again, so the
+//! settings must state cut-off, drive inertia and friction, and the estimator must be least squares.
 
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::variation_of_logs;

@@ -45,7 +45,7 @@ pub struct CutoffCandidate {
     pub predicted_error_percent: f64,
 }
 
-/// A cut-off that was selected because it has the smallest predicted parameter error.
+/// A cut-off that was selected by the predicted parameter error: a cut-off whose error is nearly the smallest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffByError {

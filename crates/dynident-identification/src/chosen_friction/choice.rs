@@ -201,8 +201,8 @@ fn friction_of_grid(
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, &first.model, &plain.values, &gains)?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &limits, &plain, equal_weights)?)
     };
-    // First the velocity scale of the smoothed sign is selected, then all terms. Logs with payloads are excluded,
-    // because their load differs from that of the bare arm.
+    // First the velocity scale of the smoothed sign is selected, then all terms. If a log has a payload, load-dependent
+    // friction is not a candidate, because its load would be that of the bare arm.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);
     let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, scale(*joint)))).collect();
     let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(smooth_step_width).collect();

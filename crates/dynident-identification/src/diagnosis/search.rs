@@ -100,8 +100,7 @@ fn search(
     Search { as_written: as_written.clone(), best: found.then_some(best), alike, tried }
 }
 
-/// Hypotheses that the logs do not distinguish from `best`. They contain the same mistakes, except for the kind of the
-/// last one.
+/// Hypotheses that the logs do not distinguish from `best`. They contain the same mistakes, except for the last one.
 fn indistinguishable(best: &Hypothesis, others: &[Explained]) -> Vec<Hypothesis> {
     let Some((last, before)) = best.mistakes.split_last() else { return Vec::new() };
     let limits = &best.settings.score;

@@ -29,8 +29,9 @@ pub(crate) fn smooth_width(term: &TorqueTerm) -> Option<f64> {
 }
 
 /// Gives all friction terms of a joint the smoothed sign s of its Coulomb friction, because they describe one friction,
-/// `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction keeps a separate smoothed sign if that of Coulomb
-/// friction is wide: real joints creep before they break away, and the data distinguish both widths.
+/// `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction keeps a separate smoothed sign unless Coulomb
+/// friction has the exact sign function: real joints creep before they break away, and the data distinguish both
+/// widths.
 pub(super) fn with_one_step(terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     let Some(step) = terms.iter().find(|term| is_coulomb(term)).and_then(step_of) else { return terms };
     let with_step = |term: TorqueTerm| match (term.kind().step_role(), step) {
