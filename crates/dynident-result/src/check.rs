@@ -93,7 +93,7 @@ pub struct HypothesisResult {
     /// Unexplained torque of each joint in the best physically consistent fit, percent of its measured torque (root
     /// mean squares).
     pub left_percent: Vec<f64>,
-    /// Names of the joints whose positions, velocities or torques exceed their limits.
+    /// Names of the joints whose positions or velocities exceed their limits.
     pub beyond_limits: Vec<String>,
     /// Score from all evidence, lower is better; a difference of 0.6 is clear.
     pub score: f64,

@@ -164,7 +164,7 @@ pub struct StrokeFile {
     pub offset_rad: f64,
     /// Period T, s.
     pub period_s: f64,
-    /// Length δ of the window around the middle of the stroke, s.
+    /// Half width δ of the time window around the middle of the stroke, s.
     pub window_s: f64,
     /// Condition number of the regressor within the window.
     pub condition_number: f64,

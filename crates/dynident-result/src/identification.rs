@@ -390,7 +390,8 @@ pub struct JointResult {
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub residual_std_nm: f64,
-    /// Correlation of the residual between successive filtered rows, which the error bars include.
+    /// Effective lag-1 correlation of the filtered residual, which determines the error bars. It is lower than the
+    /// correlation of the residual itself if columns of the regressor alternate fast.
     pub residual_correlation: Option<f64>,
     /// Time by which the joint's torque is later than its motion, from all training logs, including the compensated
     /// part; null if it is not identifiable. An entry states whether the remaining lag is large enough to matter.

@@ -15,7 +15,8 @@ pub(crate) struct Stepping {
     pub(crate) end_weight: f64,
     /// Time after which the simulation restarts from the measured motion, s; infinite for no restarts.
     pub(crate) restart_s: f64,
-    /// Law by which the torque of the drives is computed. Derivatives are only available for [`DriveLaw::Identified`].
+    /// Law by which the torque of the drives is computed. Derivatives are those of [`DriveLaw::Identified`] for every
+    /// law.
     pub(crate) law: DriveLaw,
 }
 

@@ -61,7 +61,7 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     }
     sum(&mut list, joints.clone(), Quantity::Delay, settings.delay_s);
     for joint in 0..dof {
-        // For a single joint, only the sum of command delay and read delay is identifiable.
+        // For a single joint, only the difference of command delay and read delay is identifiable.
         if dof > 1 {
             sum(&mut list, vec![joint], Quantity::ReadDelay, settings.read_delay_s);
         }

@@ -282,7 +282,7 @@ impl Study {
         serde_json::to_value(self)
     }
 
-    /// Checks that there is a log; only a study for `design` needs none.
+    /// Checks that there is a log; a study for `design`, for example, needs none.
     ///
     /// # Errors
     /// [`StudyError::Missing`] without a log.
@@ -387,7 +387,7 @@ impl Study {
         ))
     }
 
-    /// Checks that temperature-dependent friction is used only if the estimator supports it.
+    /// Checks that temperature-dependent friction is not used together with friction selection or with instruments.
     fn check_temperature(&self) -> Result<(), StudyError> {
         let terms =
             self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
