@@ -5,13 +5,15 @@
 //!
 //! The search begins at the given coordinates and at those of the joints' responses (`start.rs`). From each it descends
 //! with long time steps and short simulations that restart from the measured motion, which leave few local minima, then
-//! without restarts. The better end is refined with accurate time steps.
+//! without restarts. The better end is refined with short time steps. Long steps use the midpoint rule as well: the
+//! damping that implicit Euler steps add, stiffness × step, moves their minimum so far that the last stage begins
+//! outside of the region of the best one.
 
 use crate::error::ServoError;
-use crate::law::DriveLaw;
 use crate::likelihood::{JointLikelihood, joint_likelihood};
 use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, total_gram};
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
+use crate::quantity::Quantity;
 use crate::run::Run;
 use crate::settings::ServoSettings;
 use crate::start::{drive_coordinates, equal_drives, response_coordinates};
@@ -35,6 +37,8 @@ const MOST_PERIODS: f64 = 500.0;
 const FIRST_CORRELATED: f64 = 25.0;
 /// A period with a smaller weight is reported as not explained: its error is at least five times the usual one.
 const UNEXPLAINED_WEIGHT: f64 = 0.05;
+/// A coordinate is not needed if the cost without it is higher by less than this: 95 % of the changes by chance.
+const UNNEEDED_COST: f64 = 3.84;
 /// Longest change of the logarithm of a value in one step; other coordinates change at most by their prior deviation.
 const LONGEST_STEP: f64 = 1.0;
 /// Most attempts to find a shorter step that decreases the cost.
@@ -124,10 +128,7 @@ impl Searcher<'_> {
         let mut damping = 1e-3;
         for iteration in 1..=most {
             let Some(sums) = self.sums(z, now) else { return (iteration, false) };
-            let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
-            for (k, parameter) in self.parameters.iter().enumerate() {
-                moment[k] -= z[k] / parameter.prior_sd.powi(2);
-            }
+            let moment = self.moment(z, &sums);
             let matrix = self.with_priors(&total_gram(&sums, z.len()));
             let Some((next, point)) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
                 return (iteration, true);
@@ -153,8 +154,9 @@ impl Searcher<'_> {
     ) -> Option<(Vec<f64>, Point)> {
         for _ in 0..ATTEMPTS {
             let mut damped = matrix.clone();
-            for k in 0..z.len() {
-                damped[(k, k)] *= 1.0 + *damping;
+            for (k, parameter) in self.parameters.iter().enumerate() {
+                // Priors are exactly quadratic: a coordinate without data returns to the centre of its prior.
+                damped[(k, k)] += *damping * (matrix[(k, k)] - parameter.prior_sd.powi(-2));
             }
             let mut step = damped.cholesky()?.solve(moment);
             if step.dot(moment) < 0.01 * self.tolerance {
@@ -178,6 +180,22 @@ impl Searcher<'_> {
         None
     }
 
+    /// Returns torque limits that the motion does not show to the centre of their prior, so that they do not limit
+    /// other motion: near the largest torque of the logs a limit can follow the errors of single samples.
+    fn release_limits(&self, z: &mut Vec<f64>, now: &mut Point) {
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            let is_own = parameter.quantity == Quantity::TorqueLimit && parameter.members.len() == 1;
+            if !is_own || z[k] == 0.0 {
+                continue;
+            }
+            let mut without = z.clone();
+            without[k] = 0.0;
+            if let Some(point) = self.point(&without).filter(|point| point.cost < now.cost + UNNEEDED_COST) {
+                (*z, *now) = (without, point);
+            }
+        }
+    }
+
     /// Number of neighbouring samples with the same error, for each joint: the variance of the periods' moments over
     /// that of independent samples, median over the coordinates.
     fn correlated(&self, sums: &[PeriodSums]) -> Vec<f64> {
@@ -199,13 +217,14 @@ impl Searcher<'_> {
     /// Covariance of the coordinates: from the priors, and from the changes `(H - G)⁻¹ s` without one of the periods,
     /// which has the information `G` and the moments `s` (jackknife over clusters: MacKinnon and White 1985; Bell and
     /// McCaffrey 2002). The moments alone (White 1980) are too small if one period determines much of a coordinate.
-    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    /// `shift` is the error of the coordinates by the length of the time steps.
+    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>, shift: &DVector<f64>) -> Option<DMatrix<f64>> {
         let columns = self.parameters.len();
         let hessian = self.with_priors(gram);
         let inverse = hessian.clone().cholesky()?.inverse();
         let count = periods.len() as f64;
         if count < 2.0 {
-            return Some(inverse);
+            return Some(inverse + shift * shift.transpose());
         }
         let changes: Vec<DVector<f64>> = periods
             .iter()
@@ -217,12 +236,32 @@ impl Searcher<'_> {
         let mean = changes.iter().sum::<DVector<f64>>() / count;
         let priors = self.parameters.iter().map(|parameter| parameter.prior_sd.powi(-2));
         let priors = DMatrix::from_diagonal(&DVector::from_iterator(columns, priors));
-        let mut covariance = &inverse * priors * &inverse;
+        let mut covariance = &inverse * priors * &inverse + shift * shift.transpose();
         for change in &changes {
             let own = change - &mean;
             covariance.ger((count - 1.0) / count, &own, &own, 1.0);
         }
         Some(covariance)
+    }
+
+    /// Change of the coordinates with time steps of half the length, by one step of the search. The error by the steps
+    /// is about twice this change where friction decides it, and 4/3 of it elsewhere.
+    fn shift_by_step(&mut self, z: &[f64]) -> Option<DVector<f64>> {
+        self.stepping.step_s *= 0.5;
+        let point = self.point(z)?;
+        let sums = self.sums(z, &point)?;
+        self.stepping.step_s *= 2.0;
+        let matrix = self.with_priors(&total_gram(&sums, z.len()));
+        Some(matrix.cholesky()?.solve(&self.moment(z, &sums)))
+    }
+
+    /// Half of the negative gradient of the cost.
+    fn moment(&self, z: &[f64], sums: &[PeriodSums]) -> DVector<f64> {
+        let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            moment[k] -= z[k] / parameter.prior_sd.powi(2);
+        }
+        moment
     }
 
     /// Coordinates of the best robot whose drives are nearly equal, and the iterations to find it. With separate values
@@ -261,16 +300,25 @@ impl Searcher<'_> {
     /// restarts; `None` if no start can be simulated.
     fn best_of(&mut self, starts: Vec<Vec<f64>>, near: Option<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
         let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
-        let step_s = COARSE * self.settings.step_s;
+        let coarse = Stepping::accurate(COARSE * self.settings.step_s);
         let all: &[f64] = &[RESTART_S, f64::INFINITY];
         let starts = starts.into_iter().map(|z| (z, all)).chain(near.map(|z| (z, &all[1..])));
+        // Costs with restarts: a second descent to the same minimum needs no further steps.
+        let mut known: Vec<f64> = Vec::new();
         for (mut z, restarts) in starts {
             let mut cost = f64::INFINITY;
             for &restart_s in restarts {
-                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s, law: DriveLaw::Identified };
+                self.stepping = Stepping { restart_s, ..coarse };
                 let Some(mut now) = self.point(&z) else { continue };
                 iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
-                cost = now.cost;
+                if restart_s.is_finite() {
+                    if known.iter().any(|known| (known - now.cost).abs() < self.tolerance) {
+                        break;
+                    }
+                    known.push(now.cost);
+                } else {
+                    cost = now.cost;
+                }
             }
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, z));
@@ -334,6 +382,9 @@ pub fn search(
     for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
         searcher.tolerance = tolerance;
         let mut now = searcher.point(&z).ok_or_else(no_start)?;
+        if tolerance == settings.tolerance {
+            searcher.release_limits(&mut z, &mut now);
+        }
         let (steps, ended) = searcher.descend(&mut z, &mut now, settings.iterations);
         (iterations, settled) = (iterations + steps, ended);
         let sums = searcher.sums(&z, &now).ok_or_else(no_start)?;
@@ -344,7 +395,8 @@ pub fn search(
     }
     let (now, sums) = end.ok_or_else(no_start)?;
     let information = total_gram(&sums, z.len());
-    let covariance = searcher.covariance(&sums, &information).ok_or_else(no_start)?;
+    let shift = searcher.shift_by_step(&z).ok_or_else(no_start)?;
+    let covariance = searcher.covariance(&sums, &information, &shift).ok_or_else(no_start)?;
     Ok(Search {
         covariance,
         information,
