@@ -1,5 +1,5 @@
-//! Checks a commanded motion for mistakes of the recording and of the study: exchanged columns, late commands, units, signs, zeros,
-//! commands without effect, clamped commands, encoder jumps, invalid time stamps.
+//! Checks a commanded motion for mistakes of the recording and of the study: exchanged columns, late commands, units,
+//! signs, zeros, commands without effect, clamped commands, encoder jumps, invalid time stamps.
 
 mod clamped;
 mod finding;
