@@ -244,15 +244,15 @@ impl Searcher<'_> {
         Some(covariance)
     }
 
-    /// Change of the coordinates with time steps of half the length, by one step of the search. The error by the steps
-    /// is about twice this change where friction decides it, and 4/3 of it elsewhere.
+    /// Error of the coordinates by the length of the time steps: twice their change with steps of half the length, as for
+    /// an error of first order (Richardson), which dry friction has. The change is one step of the search.
     fn shift_by_step(&mut self, z: &[f64]) -> Option<DVector<f64>> {
         self.stepping.step_s *= 0.5;
         let point = self.point(z)?;
         let sums = self.sums(z, &point)?;
         self.stepping.step_s *= 2.0;
         let matrix = self.with_priors(&total_gram(&sums, z.len()));
-        Some(matrix.cholesky()?.solve(&self.moment(z, &sums)))
+        Some(2.0 * matrix.cholesky()?.solve(&self.moment(z, &sums)))
     }
 
     /// Half of the negative gradient of the cost.
