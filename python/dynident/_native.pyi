@@ -30,6 +30,7 @@ __all__ = [
     "_identify_factors",
     "_identify_servos",
     "_inspect",
+    "_isaac_lab",
     "_iterate",
     "_log_arrays",
     "_log_contents",
@@ -308,6 +309,7 @@ def _identify(study: Study, threads: int | None = None, progress: _Progress | No
 def _identify_servos(
     study: Study, threads: int | None = None, progress: _Progress | None = None
 ) -> tuple[str, str, str | None, str | None]: ...
+def _isaac_lab(result: str) -> str: ...
 def _check(study: Study, threads: int | None = None, progress: _Progress | None = None) -> str: ...
 def _validate(
     model: FittedModel, study: Study, threads: int | None = None, progress: _Progress | None = None

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._native import ResultError, _write_files
+from ._native import ResultError, _isaac_lab, _write_files
 from ._page import Page
 
 if TYPE_CHECKING:
@@ -172,6 +172,19 @@ class ServoModel:
 
     def _errors(self, role: str, key: str) -> dict[str, dict[str, float]]:
         return {log["name"]: dict(zip(self.joint_names, log[key], strict=True)) for log in self.result[role]}
+
+    def export(self, form: str) -> str:
+        """Exports the drives as ``isaac-lab`` (a Python module with actuators of Isaac Lab), ``mjcf`` or ``urdf``, as
+        ``dynident export --to`` does. A comment of the module lists its losses and the error of its motion.
+        """
+        forms: dict[str, Callable[[], str]] = {
+            "isaac-lab": lambda: _isaac_lab(self._json),
+            "mjcf": self.to_mjcf,
+            "urdf": self.to_urdf,
+        }
+        if form not in forms:
+            raise ResultError(f"unknown form {form!r} for drives: use {', '.join(forms)}")
+        return forms[form]()
 
     def to_mjcf(self) -> str:
         """The user's MJCF with the identified values and ``position`` actuators. Raises ``ResultError`` for a robot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import pickle
 from pathlib import Path
@@ -91,6 +92,20 @@ def test_results_are_saved_loaded_and_pickled(model: dynident.ServoModel, tmp_pa
     with pytest.raises(dynident.ResultError, match="not MJCF"):
         model.to_mjcf()
     assert "held out phase 1" in repr(model) and "stiffness" in model._repr_html_()
+
+
+def test_drives_are_exported(model: dynident.ServoModel) -> None:
+    assert model.export("urdf") == model.to_urdf()
+    with pytest.raises(dynident.ResultError, match="not MJCF"):
+        model.export("mjcf")
+    with pytest.raises(dynident.ResultError, match="isaac-lab, mjcf, urdf"):
+        model.export("c")
+    module = ast.parse(model.export("isaac-lab"))
+    functions = {one.name for one in module.body if isinstance(one, ast.FunctionDef)}
+    assert {"implicit", "delayed"} <= functions
+    numbers = {one.value for one in ast.walk(module) if isinstance(one, ast.Constant)}
+    for drive in model.result["drives"]:
+        assert any(isinstance(one, float) and one == pytest.approx(drive["stiffness"], rel=1e-4) for one in numbers)
 
 
 def test_the_table_has_all_values(model: dynident.ServoModel) -> None:

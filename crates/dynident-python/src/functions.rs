@@ -13,12 +13,13 @@ use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
 use dynident::identification::examination::{JointTrace, LogTrace};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::recording::{LogReader, RawBlock, RecordingError};
-use dynident::result::StudyChange;
+use dynident::result::{ServoFile, StudyChange};
 use dynident::study::{LogSection, StudyLogSource};
 use dynident::{
     CorrectedDescription, Error, InspectSettings, IterationWatch, NewStudy, OutputSet, ProgramPermission, RunOptions,
-    XacroSettings, check, design_study, identify, identify_servos, inspect_robot, iterate_study, iterate_with_robot,
-    log_contents, mended_robot, new_study, simulate_study, validate_result, validation_traces,
+    ServoTarget, XacroSettings, check, design_study, export_servos, identify, identify_servos, inspect_robot,
+    iterate_study, iterate_with_robot, log_contents, mended_robot, new_study, simulate_study, validate_result,
+    validation_traces,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -82,6 +83,19 @@ pub(crate) fn _identify_servos(
         let outcome = identify_servos(&study, &path, options)?;
         Ok((json(&outcome.result)?, outcome.report()?, outcome.mjcf, outcome.urdf))
     })
+}
+
+/// Actuators of Isaac Lab for a result of commands and positions: the text of a Python module.
+#[pyfunction]
+pub(crate) fn _isaac_lab(py: Python<'_>, result: &str) -> PyResult<String> {
+    let path = Path::new(RESULT);
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+    let exported = || {
+        let file = ServoFile::parse(result.as_bytes(), path).map_err(|error| wrong(error.to_string()))?;
+        let file = file.ok_or_else(|| wrong("not a result of commands and positions".to_owned()))?;
+        export_servos(&file, path, ServoTarget::IsaacLab, None, None)
+    };
+    exported().map(|made| made.exported.text).map_err(|error| errors::job(py, &error))
 }
 
 #[pyfunction]

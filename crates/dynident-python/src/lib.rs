@@ -32,8 +32,8 @@ mod _native {
     use crate::function_robot::Run;
     #[pymodule_export]
     use crate::functions::{
-        _check, _command, _design, _identify, _identify_servos, _inspect, _iterate, _log_arrays, _log_contents, _new,
-        _residuals, _simulate, _validate, _write_files,
+        _check, _command, _design, _identify, _identify_servos, _inspect, _isaac_lab, _iterate, _log_arrays,
+        _log_contents, _new, _residuals, _simulate, _validate, _write_files,
     };
     #[pymodule_export]
     use crate::model::{_plot_convergence, FittedModel};

@@ -56,6 +56,29 @@ impl CommandedMotion {
             .map(|joint| quantisation_step(&self.joint(&self.positions, joint).collect::<Vec<_>>()))
             .collect()
     }
+
+    /// Whether commands have the steps of an encoder and positions do not, for each joint, or the reverse; `None` if
+    /// both or neither have them.
+    pub(crate) fn are_commands_counted(&self, joint: usize) -> Option<bool> {
+        let is_counted = |values: &[f64]| quantisation_step(&self.joint(values, joint).collect::<Vec<_>>()).is_some();
+        let [commands, positions] = [&self.commands, &self.positions].map(|values| is_counted(values));
+        (commands != positions).then_some(commands)
+    }
+
+    /// Uses each command `late_s` seconds before its stamp. A command holds until the next; the last one remains.
+    fn advance_commands(&mut self, late_s: f64) {
+        if late_s <= 0.0 {
+            return;
+        }
+        let joints = self.joints.len();
+        let mut later = 0;
+        for sample in 0..self.samples() {
+            while later + 1 < self.samples() && self.times_s[later + 1] <= self.times_s[sample] + late_s {
+                later += 1;
+            }
+            self.commands.copy_within(later * joints..(later + 1) * joints, sample * joints);
+        }
+    }
 }
 
 impl Log {
@@ -84,6 +107,7 @@ impl Log {
                 motion.commands.extend(block.command.iter().map(|values| values[row]));
             }
         }
+        motion.advance_commands(self.format.command_late_s.unwrap_or(0.0));
         Ok(motion)
     }
 }
@@ -119,6 +143,20 @@ mod tests {
         assert_eq!(motion.positions, [1.0, 90.0, 1.0, 91.0, 2.0, 92.0].map(|q| q * degree));
         assert_eq!(motion.joint(&motion.commands, 1).collect::<Vec<_>>(), [-0.25, 0.75, 1.75]);
         assert_eq!((motion.samples(), &motion.rows[..]), (3, &[0, 1, 2][..]));
+    }
+
+    /// A command that a recorder stamps 20 ms late belongs to the row before.
+    #[test]
+    fn late_commands_are_used_earlier() {
+        for (late, expected) in [("0.0", [0.0, 0.5, 1.0]), ("0.02", [0.5, 0.5, 1.0]), ("0.021", [0.5, 1.0, 1.0])] {
+            let (_folder, log) = log(&TEXT.replace(",1.5,", ",0,"), &format!("{FORMAT}command_late_s = {late}"));
+            let motion = log.commanded_motion().unwrap();
+            let found: Vec<f64> = motion.joint(&motion.commands, 1).map(|c| 0.5 * (c + 0.25)).collect();
+            assert_eq!(found, expected, "{late}");
+        }
+        let (_folder, log) = log(TEXT, &format!("{FORMAT}command_late_s = -0.1"));
+        let refused = log.commanded_motion().unwrap_err().to_string();
+        assert!(refused.contains("command_late_s"), "{refused}");
     }
 
     #[test]

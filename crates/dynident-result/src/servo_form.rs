@@ -27,7 +27,7 @@ pub struct ServoFormLog {
     pub name: String,
     /// Whether the log was held out of the fit.
     pub held_out: bool,
-    /// Root mean square error of the simulated position of each joint, rad (m); null if the simulation diverges.
+    /// Root mean square error of the simulated position of each joint, rad (m); null if the simulation fails.
     pub errors: Option<Vec<f64>>,
     /// Root mean square position error of each joint with the identified drives, rad (m).
     pub model_errors: Vec<f64>,
@@ -40,11 +40,11 @@ impl ServoForm {
         let held_out = self.logs.iter().any(|log| log.held_out);
         let logs: Vec<&ServoFormLog> = self.logs.iter().filter(|log| log.held_out == held_out).collect();
         let role = if held_out { "held-out" } else { "training" };
-        let diverged: Vec<&str> = logs.iter().filter(|log| log.errors.is_none()).map(|log| log.name.as_str()).collect();
-        if !diverged.is_empty() {
+        let failed: Vec<&str> = logs.iter().filter(|log| log.errors.is_none()).map(|log| log.name.as_str()).collect();
+        if !failed.is_empty() {
             all.push(format!(
-                "{what}: PROBLEM: the simulation of {} diverges with steps of {} ms; use shorter physics steps.",
-                diverged.join(", "),
+                "{what}: PROBLEM: the simulation of {} fails with steps of {} ms; use shorter physics steps.",
+                failed.join(", "),
                 1e3 * self.step_s
             ));
         }
@@ -71,9 +71,8 @@ impl ServoForm {
         all
     }
 
-    /// Mean position error with the exported drives, and mean position error with the identified drives, rad (m). Both
-    /// are means over joints and held-out logs, or training logs if there are no held-out logs. `None` if a simulation
-    /// diverges.
+    /// Mean over joints and held-out logs (training logs without them) of the form's errors and of the identified
+    /// drives' errors, rad (m); `None` if a simulation fails.
     pub fn mean_errors(&self) -> Option<[f64; 2]> {
         let held_out = self.logs.iter().any(|log| log.held_out);
         let logs = || self.logs.iter().filter(|log| log.held_out == held_out);
@@ -105,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_simulation_that_diverges_is_a_problem() {
+    fn a_simulation_that_fails_is_a_problem() {
         let form = ServoForm { step_s: 0.02, logs: vec![log(true, None)], ..ServoForm::default() };
         let sentences = form.sentences("implicit", &["pan".into(), "slide".into()], &[true, false]);
         assert!(sentences.len() == 1 && sentences[0].contains("PROBLEM") && sentences[0].contains("20 ms"));

@@ -59,7 +59,7 @@ fn forms(file: &ServoFile) -> String {
     let form = |form: &ServoForm| {
         let error = form
             .mean_errors()
-            .map_or_else(|| "unknown (no simulated motion)".to_owned(), |[own, _]| format!("{:.1}", 1e3 * own));
+            .map_or_else(|| "unknown (the simulation fails)".to_owned(), |[own, _]| format!("{:.1}", 1e3 * own));
         format!("{} {error}", form.form)
     };
     let forms: Vec<String> = file.forms.iter().map(form).collect();

@@ -138,7 +138,11 @@ fn result(folder: &Path) {
 fn an_exported_result_states_what_is_lost_on_the_terminal_in_json_and_in_the_file() {
     let folder = tempfile::tempdir().unwrap();
     result(folder.path());
-    let words = ["isaac-lab-implicit lacks something", "joint1 12.0 mrad (3.0), joint2 20.0 mrad (4.0)", "diverges"];
+    let words = [
+        "isaac-lab-implicit lacks something",
+        "joint1 12.0 mrad (3.0), joint2 20.0 mrad (4.0)",
+        "fails with steps of 5 ms",
+    ];
     let ran = run_in(folder.path(), &["export", "result.json", "--to", "isaac-lab", "--out", "drives.py"]);
     assert_eq!(ran.status, 0, "{}", ran.stderr);
     let file = std::fs::read_to_string(folder.path().join("drives.py")).unwrap();

@@ -50,7 +50,14 @@ pub enum CommandFinding {
         /// Number of joints that show this.
         joints: usize,
     },
-    /// Values are in degrees although the study states radians.
+    /// The recorder stamps the commands late: they follow the positions, which have the steps of an encoder.
+    Late {
+        /// Time by which the commands follow the positions, s: median over the joints.
+        lag_s: f64,
+        /// Number of joints that show it.
+        joints: usize,
+    },
+    /// Degrees where the study states radians.
     Degrees {
         /// The channels in degrees.
         of: UnitOf,
@@ -118,6 +125,7 @@ impl CommandFinding {
         match self {
             Self::Stamps { .. }
             | Self::Exchanged { .. }
+            | Self::Late { .. }
             | Self::Degrees { .. }
             | Self::Sign { .. }
             | Self::Jumps { is_turn: true, .. } => Level::Problem,
@@ -132,6 +140,7 @@ impl CommandFinding {
             Self::Stamps { fault: StampFault::Equal } => "all time stamps are equal".to_owned(),
             Self::Stamps { fault: StampFault::WholeSeconds } => "the time stamps are whole seconds".to_owned(),
             Self::Exchanged { .. } => "command and measured position are exchanged".to_owned(),
+            Self::Late { .. } => "the commands are recorded late".to_owned(),
             Self::Degrees { of, joints: those, .. } => {
                 let what = match of {
                     UnitOf::Commands => "the commands",
@@ -160,6 +169,9 @@ impl CommandFinding {
             }
             Self::Exchanged { lag_s, joints } => format!(
                 "the column named as command follows the column named as position by {lag_s:.2} s, for {joints} joints; exchange the columns of both"
+            ),
+            Self::Late { lag_s, joints } => format!(
+                "the commands follow the measured positions, which have the steps of an encoder, by {lag_s:.2} s, for {joints} joints; a servo moves after its command, so they are late by at least this time. `identify` states the rest"
             ),
             Self::Degrees { of: UnitOf::Both, .. } => {
                 "the positions are far outside of the limits of the robot description, and inside as degrees".to_owned()

@@ -1,5 +1,5 @@
-//! Check of a commanded motion for mistakes in the recording and in the study: exchanged columns, units, signs, zeros,
-//! commands without effect, clamped commands, encoder jumps, invalid time stamps.
+//! Checks a commanded motion for mistakes of the recording and of the study: exchanged columns, late commands, units,
+//! signs, zeros, commands without effect, clamped commands, encoder jumps, invalid time stamps.
 
 mod clamped;
 mod finding;
@@ -65,9 +65,9 @@ pub fn check_commands(
         })
         .collect();
     let mut found: Vec<CommandFinding> = stamps(&motion.times_s).into_iter().collect();
-    if let Some(exchanged) = exchanged(&joints, step_s, settings) {
-        // If columns are exchanged, other comparisons of command and position have no meaning.
-        found.push(exchanged);
+    if let Some(preceding) = preceding(motion, &joints, step_s, settings) {
+        // Other comparisons of command and position have no meaning.
+        found.push(preceding);
         return found;
     }
     let jumps = |(joint, own)| jumps::jumps(joint, own, &motion.times_s, settings);
@@ -120,20 +120,35 @@ fn stamps(times_s: &[f64]) -> Option<CommandFinding> {
     Some(CommandFinding::Stamps { fault })
 }
 
-fn exchanged(joints: &[JointMotion], step_s: f64, settings: &CommandCheckSettings) -> Option<CommandFinding> {
-    let is_clear = |own: &&JointMotion| {
+/// The finding about positions that precede their commands: exchanged columns or late commands.
+fn preceding(
+    motion: &CommandedMotion,
+    joints: &[JointMotion],
+    step_s: f64,
+    settings: &CommandCheckSettings,
+) -> Option<CommandFinding> {
+    let is_clear = |own: &JointMotion| {
         own.moves(settings)
             && own.response.correlation >= settings.min_correlation
             && own.response.lag != 0
             && own.response.lag_gain >= MIN_LAG_GAIN
     };
-    let lags: Vec<isize> = joints.iter().filter(is_clear).map(|own| own.response.lag).collect();
-    let mut negative: Vec<f64> = lags.iter().filter(|lag| **lag < 0).map(|lag| -(*lag as f64) * step_s).collect();
-    if negative.is_empty() || (negative.len() as f64) < MIN_EXCHANGED_SHARE * lags.len() as f64 {
+    let clear: Vec<usize> = (0..joints.len()).filter(|&joint| is_clear(&joints[joint])).collect();
+    let negative: Vec<usize> = clear.iter().copied().filter(|&joint| joints[joint].response.lag < 0).collect();
+    if negative.is_empty() || (negative.len() as f64) < MIN_EXCHANGED_SHARE * clear.len() as f64 {
         return None;
     }
+    let mut lags: Vec<f64> = negative.iter().map(|&joint| -(joints[joint].response.lag as f64) * step_s).collect();
+    let lag_s = median(&mut lags)?;
+    // A measured position has the steps of its encoder, in its own column or in that of the command.
+    let of_encoder =
+        |commands: bool| negative.iter().filter(|&&joint| motion.are_commands_counted(joint) == Some(commands)).count();
     let joints = negative.len();
-    Some(CommandFinding::Exchanged { lag_s: median(&mut negative)?, joints })
+    Some(if of_encoder(false) > of_encoder(true) {
+        CommandFinding::Late { lag_s, joints }
+    } else {
+        CommandFinding::Exchanged { lag_s, joints }
+    })
 }
 
 /// Findings about degrees, and the joints with such values.

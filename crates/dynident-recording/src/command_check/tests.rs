@@ -63,6 +63,21 @@ fn a_correct_log_has_no_findings() {
     assert_eq!(found(&still), []);
 }
 
+/// Commands that a recorder stamps late are not exchanged with positions: the positions have the steps of an encoder.
+#[test]
+fn late_commands_are_found() {
+    for rows in [10, 15, 25] {
+        let mut log = motion();
+        let commands = log.commands.clone();
+        for joint in 0..3 {
+            each(&mut log.commands, joint, |i, _| commands[3 * i.saturating_sub(rows) + joint]);
+        }
+        let [CommandFinding::Late { lag_s, joints: 3 }] = found(&log)[..] else { panic!("{:?}", found(&log)) };
+        // The response itself needs 0.1 s.
+        assert!((lag_s - (rows as f64 * STEP_S - 0.1)).abs() < 0.041, "{rows} rows: {lag_s}");
+    }
+}
+
 #[test]
 fn exchanged_columns_are_found() {
     let mut log = motion();

@@ -223,6 +223,9 @@ pub struct LogFormat {
     /// rad (m) after unit, scale and offset. They can be given in addition to `torque` or instead of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<ChannelGroup>,
+    /// Time by which the recorder stamps commands late, s: each command is used this much earlier. Default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_late_s: Option<f64>,
     /// Joint temperatures, °C, for temperature-dependent friction. Convert other units by `scale` and `offset`; several
     /// joints may use the same column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -268,6 +271,9 @@ pub struct LogFormat {
     pub bridge_gaps: bool,
 }
 
+/// Largest time by which commands may be stamped late, s: recorders buffer less.
+const MAX_COMMAND_LATE_S: f64 = 10.0;
+
 fn yes() -> bool {
     true
 }
@@ -291,6 +297,7 @@ impl LogFormat {
             acceleration: None,
             torque: Some(torque),
             command: None,
+            command_late_s: None,
             temperature: None,
             rows: None,
             fraction: None,
@@ -367,6 +374,12 @@ impl LogFormat {
         {
             let fix = "write [from, to] in seconds with from < to";
             return wrong("time_range_s", &format!("[{from}, {to}] is empty"), fix);
+        }
+        if let Some(late) = self.command_late_s
+            && !(0.0..=MAX_COMMAND_LATE_S).contains(&late)
+        {
+            let fix = "give the seconds by which commands are stamped late, 0 to 10";
+            return wrong("command_late_s", &format!("{late} is out of range"), fix);
         }
         if self.keep_every == Some(0) {
             return wrong("keep_every", "0 keeps no row", "give 1 for all rows, 2 for every second row, ..");

@@ -192,6 +192,43 @@ fn clamped_commands_and_jumps_name_log_and_time() {
     assert!(has(&["encoder of joint2 jumps", "a whole turn", "15.02 s"]), "{sentences:?}");
 }
 
+/// Recordings of a bench in JSON state their mass and gain; a study without them gets the keys.
+#[test]
+fn masses_and_gains_of_a_bench_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, mass, kp) in [("light.json", 0.3, 16), ("heavy.json", 0.6, 32)] {
+        let entries: Vec<String> = rows()
+            .iter()
+            .map(|row| {
+                format!("{{\"timestamp\": {}, \"position\": {}, \"goal_position\": {}}}", row[0], row[1], row[3])
+            })
+            .collect();
+        let text = format!("{{\"mass\": {mass}, \"kp\": {kp}, \"entries\": [{}]}}", entries.join(", "));
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let urdf = "<robot name=\"bench\"><link name=\"base\"/><link name=\"rod\"><inertial><origin xyz=\"0 0 -0.1\"/>\
+                <mass value=\"0.1\"/><inertia ixx=\"0.001\" iyy=\"0.001\" izz=\"0.001\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/>\
+                </inertial></link><joint name=\"swing\" type=\"continuous\"><parent link=\"base\"/><child link=\"rod\"/>\
+                <axis xyz=\"0 1 0\"/></joint></robot>";
+    std::fs::write(folder.path().join("bench.urdf"), urdf).unwrap();
+    let of = |keys: &str, more: &str| {
+        let text = format!(
+            "[robot]\nfile = \"bench.urdf\"\n[format]\ntime = {{ column = \"timestamp\" }}\nposition = {{ columns = \
+             [\"position\"] }}\ncommand = {{ columns = [\"goal_position\"] }}\n{more}[[log]]\nfile = \"light.json\"\n\
+             {keys}[[log]]\nfile = \"heavy.json\"\n{}",
+            keys.replace("0.5", "1.0")
+        );
+        let path = folder.path().join("study.toml");
+        check(&Study::parse(&text, &path).unwrap(), &path, &OPTIONS).unwrap().check
+    };
+    let found = of("", "");
+    let lines: Vec<&str> = found.findings.iter().flat_map(|own| &own.write).map(|change| &change.line[..]).collect();
+    assert_eq!(lines, ["payload = \"0.3 kg\"", "payload = \"0.6 kg\"", "servo_gain = 0.5", "servo_gain = 1"]);
+    let payload = "[[payload]]\nname = \"own\"\nlink = \"rod\"\nmass_kg = 0.3\ncom_m = [0.0, 0.0, -0.15]\n";
+    let stated = of("payload = \"own\"\nservo_gain = 0.5\n", payload);
+    assert!(stated.findings.iter().all(|finding| finding.write.is_empty()), "{:?}", stated.findings);
+}
+
 #[test]
 fn a_log_without_torque_and_commands_is_refused_with_the_fix() {
     let folder = tempfile::tempdir().unwrap();

@@ -200,3 +200,34 @@ fn a_design_without_values_of_the_drives_or_without_motion_is_refused() {
     let found = design_servos(&study, &folder.path().join("study.toml"), &OPTIONS).unwrap();
     assert!(found.file.drives[0].values.iter().any(|value| value.name == "stiffness" && value.value > 30.0));
 }
+
+/// A recorder stamps the commands 0.1 s late: the fit finds motion before its command, and the printed key corrects it.
+#[test]
+fn commands_that_are_recorded_late_are_a_problem_with_the_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, phase) in [("one.csv", 0.0), ("two.csv", 1.0)] {
+        let path = folder.path().join(name);
+        write_log(&path, phase);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let late = |(at, row): (usize, &Vec<&str>)| {
+            let command = &rows[at.saturating_sub(5).max(1)];
+            if at == 0 { row.join(",") } else { [&row[..3], &command[3..]].concat().join(",") }
+        };
+        let lines: Vec<String> = rows.iter().enumerate().map(late).collect();
+        std::fs::write(&path, lines.join("\n")).unwrap();
+    }
+    let fit = "[drive.servo.fit]\nalike = true\nstep_s = 0.005\n";
+    let mut study = study(folder.path(), fit);
+    let found = |study: &Study| identify_servos(study, &folder.path().join("study.toml"), &OPTIONS).unwrap().result;
+    let problem = found(&study).problems.join("\n");
+    let stated = problem.split("command_late_s = ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    // The servos need 20 ms of the 100.
+    let stated: f64 = stated.parse().unwrap();
+    assert!((stated - 0.08).abs() < 0.003, "{problem}");
+    study.format.as_mut().unwrap().command_late_s = Some(0.1);
+    let corrected = found(&study);
+    assert!(corrected.problems.is_empty(), "{:?}", corrected.problems);
+    let drive = &corrected.drives[0];
+    assert!((drive.delay_s - drive.read_delay_s - 0.02).abs() < 0.001, "{drive:?}");
+}

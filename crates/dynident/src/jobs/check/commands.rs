@@ -53,7 +53,7 @@ pub(super) fn command_findings(
                 what: finding.what(names),
                 evidence: finding.evidence(names),
                 write: changes(&finding, &format, &table, names.len()),
-                or: of_position(&finding, &format, &table, names.len()).into_iter().collect(),
+                or: alternative(&finding, &format, &table, names.len()).into_iter().collect(),
                 code: format!("check-{kind}"),
             };
             match found.iter_mut().find(|(known, _)| known.what == own.what) {
@@ -82,9 +82,8 @@ fn kind(finding: &CommandFinding) -> &'static str {
     }
 }
 
-/// The corresponding correction of the position, because commands and positions only show that one of the two is
-/// wrong.
-fn of_position(finding: &CommandFinding, format: &LogFormat, table: &str, joints: usize) -> Option<String> {
+/// Another correction: commands and positions only show that one of both is wrong.
+fn alternative(finding: &CommandFinding, format: &LogFormat, table: &str, joints: usize) -> Option<String> {
     let position = &format.position;
     let line = match finding {
         CommandFinding::Sign { joint, .. } => {
@@ -96,6 +95,12 @@ fn of_position(finding: &CommandFinding, format: &LogFormat, table: &str, joints
             let own = |place: usize| at(position.offset.as_ref(), place, 0.0);
             let value = |place: usize| own(place) - if place == *joint { *offset } else { 0.0 };
             format!("offset = {}", list((0..joints).map(|place| format!("{:.4}", value(place)))))
+        }
+        CommandFinding::Exchanged { lag_s, .. } => {
+            return Some(format!(
+                "the columns are right and the recorder stamps the commands late ([{table}] {})",
+                late(format, *lag_s)
+            ));
         }
         _ => return None,
     };
@@ -143,12 +148,20 @@ fn changes(finding: &CommandFinding, format: &LogFormat, table: &str, joints: us
             };
             groups.iter().map(|(name, group)| change(name, unit(group))).collect()
         }
-        // Columns in two different files must be exchanged by hand.
+        CommandFinding::Late { lag_s, .. } => {
+            vec![StudyChange { table: table.to_owned(), line: late(format, *lag_s) }]
+        }
+        // Columns in two files are exchanged by hand.
         CommandFinding::Exchanged { .. } if format.position.file.is_none() && command.file.is_none() => {
             vec![change("position", columns(command)), change("command", columns(&format.position))]
         }
         _ => Vec::new(),
     }
+}
+
+/// The key for commands that are stamped later by `more_s` than the format states.
+fn late(format: &LogFormat, more_s: f64) -> String {
+    format!("command_late_s = {:.3}", format.command_late_s.unwrap_or(0.0) + more_s)
 }
 
 fn columns(group: &ChannelGroup) -> String {

@@ -1,5 +1,6 @@
 //! `check`: tests whether study, robot and logs are consistent, before any fit.
 
+mod bench;
 mod changes;
 mod commands;
 mod description;
@@ -14,6 +15,7 @@ use crate::inputs::InputFiles;
 use crate::jobs::options::RunOptions;
 use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyChange, StudyCheck};
 use crate::study::{Folders, Study, StudyFile, StudyRobot};
+use bench::bench_findings;
 use commands::{command_findings, is_without_torque};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{
@@ -113,6 +115,7 @@ fn check_commanded(
         commanded_logs: sources.len(),
         ..StudyCheck::default()
     };
+    check.findings.extend(bench_findings(study, &sources));
     check.findings.extend(impossible_bodies(robot));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })

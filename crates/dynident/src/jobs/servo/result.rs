@@ -14,8 +14,10 @@ use dynident_servo::{Drive, Quantity, Run, Scale, ServoRobot, ServoValue, errors
 const MOST_SAMPLES: usize = 1500;
 /// A value is determined if the width of its interval is at most this share of the width before the fit.
 pub(super) const DETERMINED: f64 = 0.5;
-/// The common scale is determined if the width of its interval is at most this share of the width before the fit.
-/// Without a known reference the fit narrows it by less than a quarter.
+/// Least time by which a motion must begin before its command to be reported, s: steps of the simulation are 2.5 ms.
+const LEAST_LATE_S: f64 = 0.0025;
+/// The scale is determined if its interval is at most this part of that before the fit: without an anchor, the fit
+/// narrows it by less than a quarter.
 const SCALE_DETERMINED: f64 = 0.5;
 
 pub(super) fn servo_file(
@@ -71,11 +73,33 @@ pub(super) fn servo_file(
         if run.role == Role::Validate { file.validation.push(log) } else { file.training.push(log) }
     }
     file.notes.extend(unexplained(&file, runs, found));
+    file.problems.extend(late_commands(&file, study));
     remarks(&mut file);
     Ok(file)
 }
 
-/// One sentence for each log with time intervals that the model does not explain.
+/// The problem of motion that begins before its command, which no servo does.
+fn late_commands(file: &ServoFile, study: StudyFile<'_>) -> Option<String> {
+    let own = file.drives.iter().map(|drive| {
+        let bar = drive.values.iter().filter(|value| value.name.ends_with("delay")).map(|value| value.half_width_95);
+        (drive.read_delay_s - drive.delay_s, bar.fold(LEAST_LATE_S, f64::max))
+    });
+    let early = own.enumerate().filter(|(_, (early_s, bar))| early_s > bar).collect::<Vec<_>>();
+    let longest = early.iter().map(|(_, (early_s, _))| *early_s).fold(0.0, f64::max);
+    let names: Vec<&str> = early.iter().map(|(joint, _)| file.joints[*joint].as_str()).collect();
+    let stated = study.format_of(0).command_late_s.unwrap_or(0.0);
+    (!names.is_empty()).then(|| {
+        format!(
+            "the motion of {} begins up to {:.0} ms before its command: the recorder stamps commands late. Write \
+             command_late_s = {:.3} or more in [format] of the study; a servo itself needs 5 to 30 ms",
+            names.join(", "),
+            1e3 * longest,
+            stated + longest
+        )
+    })
+}
+
+/// A sentence for each log with intervals that the model does not explain.
 fn unexplained(file: &ServoFile, runs: &[RoleRun], found: &Found) -> Vec<String> {
     let training: Vec<&RoleRun> = runs.iter().filter(|run| run.role != Role::Validate).collect();
     let of_log = |(index, run): (usize, &&RoleRun)| {
