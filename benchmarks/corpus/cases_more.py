@@ -105,7 +105,7 @@ def motor_and_joint(d, a, b, arm):
     return both(d, a, b, f)
 
 
-@case("panda", rate=50, seconds=40, true_rate=1000.0, say="repeat|held|keep_every")
+@case("panda", rate=50, seconds=40, say="repeat|held|keep_every")
 def held_values_1khz(d, a, b, arm):
     """logger at 1 kHz, robot state at 50 Hz: each row repeats 20 times"""
     def f(l, p):

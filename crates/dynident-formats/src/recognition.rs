@@ -63,6 +63,12 @@ const JOBLIB_FIX: &str = "it may contain pickled objects, so it is never loaded;
 const SIMULINK_FIX: &str = "it is a model without a recording; save the logged signals in MATLAB: `q = out.q.Data; tau = out.tau.Data; t = out.tout; save(\"log.mat\", \"t\", \"q\", \"tau\", \"-v7\")`";
 const MDF_FIX: &str = "convert it in Python: `asammdf.MDF(\"log.mf4\").to_dataframe(raster=0.001).to_csv(\"log.csv\")` with the step of your recording in seconds";
 const UNPACK_FIX: &str = "unpack it first";
+const TAR: &str = "a tar archive";
+const TAR_FIX: &str = "unpack it (`tar -xf FILE`) and give the files in it";
+/// Place and value of the magic text of a tar archive.
+const TAR_MAGIC: (usize, &[u8]) = (257, b"ustar");
+const ECHO: &str = "the text of `ros2 topic echo`";
+const ECHO_FIX: &str = "record a bag (`ros2 bag record /joint_states`, in ROS 1 `rosbag record /joint_states`), or write a table (`ros2 topic echo --csv /joint_states > log.csv`, in ROS 1 `rostopic echo -p`)";
 const UNSUPPORTED: &[Unsupported] = &[
     unsupported(b"#ROSBAG V", "a ROS 1 bag of version 1", "convert it with `rosbag fix`"),
     unsupported(
@@ -98,6 +104,8 @@ const UNSUPPORTED: &[Unsupported] = &[
     unsupported(b"\x04\x22\x4D\x18", "an LZ4 archive", UNPACK_FIX),
     unsupported(b"7z\xBC\xAF\x27\x1C", "a 7-Zip archive", UNPACK_FIX),
     unsupported(b"<?xml", "an XML document", EXPORT_FIX),
+    unsupported(b"header:\n  stamp:", ECHO, ECHO_FIX),
+    unsupported(b"header: \n  seq:", ECHO, ECHO_FIX),
 ];
 
 fn contains(head: &[u8], wanted: &[u8]) -> bool {
@@ -116,6 +124,9 @@ pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileErr
         && other.is_none_or(|other| other.contains.is_empty())
     {
         return Ok(*format);
+    }
+    if head.get(TAR_MAGIC.0..).is_some_and(|rest| rest.starts_with(TAR_MAGIC.1)) {
+        return Err(FileError::OtherFormat { file: path.to_owned(), format: TAR, fix: TAR_FIX });
     }
     if arrow::begins_stream(head) {
         return Ok(FileFormat::Arrow);
@@ -184,6 +195,21 @@ fn is_json_document(head: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn archives_and_printed_messages_name_their_fix() {
+        let mut tar = vec![0; 512];
+        tar[..7].copy_from_slice(b"run.csv");
+        tar[257..263].copy_from_slice(b"ustar\0");
+        let message = |head: &[u8]| recognised(Path::new("log"), head).unwrap_err().to_string();
+        assert!(message(&tar).contains("tar -xf"), "{}", message(&tar));
+        let ros2 = b"header:\n  stamp:\n    sec: 1718000000\n";
+        let ros1 = b"header: \n  seq: 1\n  stamp: \n";
+        for head in [&ros2[..], ros1] {
+            assert!(message(head).contains("ros2 bag record"), "{}", message(head));
+        }
+        assert!(recognised(Path::new("log"), b"header,q\n1,2\n").is_ok());
+    }
 
     #[test]
     fn json_documents_are_recognised() {

@@ -111,7 +111,7 @@ impl LoopLog {
         let log_rate_hz = stream.rate_hz();
         if outputs.rows.iter().any(Vec::is_empty) {
             let (rows, needed) = (samples as u64, outputs.filters.needed());
-            return Err(LogError::NothingLeft { log: name, rows, needed }.into());
+            return Err(LogError::NothingLeft { log: name, rows, needed, cause: String::new() }.into());
         }
         let begins_s = commanded.start_s().min(0.0);
         let ends_s =

@@ -69,8 +69,8 @@ impl<T: Clone> OneOrMany<T> {
 ///
 /// `joint = M · (scale · sign · unit · column) + offset`
 ///
-/// Here `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are values for
-/// each column; `offset` is a value for each joint in SI units (rad, m, N m, N).
+/// where `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are per
+/// column; `offset` is per joint and in SI (rad, m, N m, N). With `sum`, a joint has several columns.
 ///
 /// ```
 /// let coupled_wrist: dynident_recording::log::ChannelGroup = toml::from_str(
@@ -114,6 +114,12 @@ pub struct ChannelGroup {
     /// Square matrix of `columns = inverse_matrix · joint`, as data sheets state it from joints to motors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inverse_matrix: Option<Vec<Vec<f64>>>,
+    /// Factors of a sum of several columns for each joint, each one value or one for each joint; `columns` then lists
+    /// the columns of all joints for the first factor, then those for the second, and so on. `scale`, `sign` and
+    /// `unit` are per joint and apply to the sum. `columns = ["q_d{1..6}", "q{1..6}"]` with `sum = [90.0, -90.0]` is
+    /// the torque of a position controller.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sum: Option<Vec<OneOrMany<f64>>>,
 }
 
 impl ChannelGroup {
@@ -128,6 +134,7 @@ impl ChannelGroup {
             offset: None,
             matrix: None,
             inverse_matrix: None,
+            sum: None,
         }
     }
 
@@ -183,15 +190,15 @@ impl ChannelGroup {
         let key = quantity.key();
         let columns = self.columns_of(key, joints)?.len();
         let at = |name: &str| format!("{key}.{name}");
-        let wrong = |name: &str, found: usize, expected: usize, what: &str| {
-            FormatError::new(
-                at(name),
-                format!("{found} entries for {expected} {what}"),
-                format!("give one value, or one for each of the {expected} {what}"),
-            )
-        };
         if self.matrix.is_some() && self.inverse_matrix.is_some() {
             return Err(FormatError::new(at("matrix"), "matrix and inverse_matrix are both given", "keep one of them"));
+        }
+        let files = self.files(&at("file"), joints)?.len();
+        if files > 1 && files != columns {
+            return Err(wrong_length(key, "file", files, columns, "columns"));
+        }
+        if let Some(sum) = &self.sum {
+            return self.validate_sum(quantity, joints, sum, columns);
         }
         let count_matters = self.matrix.is_none();
         if columns == 0 || (count_matters && columns != joints.len()) {
@@ -201,13 +208,53 @@ impl ChannelGroup {
                 format!("give one column for each of: {}", joints.join(", ")),
             ));
         }
-        let files = self.files(&at("file"), joints)?.len();
-        if files > 1 && files != columns {
-            return Err(wrong("file", files, columns, "columns"));
+        self.validate_factors(quantity, columns, joints.len())?;
+        if let Some(matrix) = &self.matrix {
+            check_matrix(&at("matrix"), matrix, joints.len(), columns)?;
         }
+        if let Some(matrix) = &self.inverse_matrix {
+            check_matrix(&at("inverse_matrix"), matrix, joints.len(), columns)?;
+        }
+        Ok(())
+    }
+
+    /// Checks the sum of several columns for each joint.
+    fn validate_sum(
+        &self,
+        quantity: Quantity,
+        joints: &[String],
+        sum: &[OneOrMany<f64>],
+        columns: usize,
+    ) -> Result<(), FormatError> {
+        let key = quantity.key();
+        let at = |name: &str| format!("{key}.{name}");
+        if self.matrix.is_some() || self.inverse_matrix.is_some() {
+            return Err(FormatError::new(at("sum"), "sum and a matrix are both given", "keep one of them"));
+        }
+        let expected = sum.len() * joints.len();
+        if columns != expected || columns == 0 {
+            return Err(FormatError::new(
+                at("columns"),
+                format!("{columns} columns for {} factors of `sum` and {} joints", sum.len(), joints.len()),
+                format!("give {expected} columns: those of all joints for the first factor, then for the second"),
+            ));
+        }
+        if let Some(factor) = sum.iter().find(|factor| !factor.fits(joints.len())) {
+            return Err(wrong_length(key, "sum", factor.values().len(), joints.len(), "joints"));
+        }
+        if let Some(value) = sum.iter().flat_map(OneOrMany::values).find(|value| !value.is_finite()) {
+            return Err(FormatError::new(at("sum"), format!("{value:?} is not allowed"), "give finite numbers"));
+        }
+        self.validate_factors(quantity, joints.len(), joints.len())
+    }
+
+    /// Checks unit, scale, sign and offset.
+    fn validate_factors(&self, quantity: Quantity, columns: usize, joints: usize) -> Result<(), FormatError> {
+        let key = quantity.key();
+        let at = |name: &str| format!("{key}.{name}");
         if let Some(unit) = &self.unit {
             if !unit.fits(columns) {
-                return Err(wrong("unit", unit.values().len(), columns, "columns"));
+                return Err(wrong_length(key, "unit", unit.values().len(), columns, "columns"));
             }
             if let Some(unknown) = unit.values().iter().find(|unit| si_factor(unit, quantity).is_none()) {
                 return Err(FormatError::new(
@@ -220,11 +267,11 @@ impl ChannelGroup {
         for (name, values, expected, what) in [
             ("scale", &self.scale, columns, "columns"),
             ("sign", &self.sign, columns, "columns"),
-            ("offset", &self.offset, joints.len(), "joints"),
+            ("offset", &self.offset, joints, "joints"),
         ] {
             let Some(values) = values else { continue };
             if !values.fits(expected) {
-                return Err(wrong(name, values.values().len(), expected, what));
+                return Err(wrong_length(key, name, values.values().len(), expected, what));
             }
             let bad = values.values().iter().find(|value| match name {
                 "sign" => value.abs() != 1.0,
@@ -240,14 +287,16 @@ impl ChannelGroup {
                 return Err(FormatError::new(at(name), format!("{value:?} is not allowed"), fix));
             }
         }
-        if let Some(matrix) = &self.matrix {
-            check_matrix(&at("matrix"), matrix, joints.len(), columns)?;
-        }
-        if let Some(matrix) = &self.inverse_matrix {
-            check_matrix(&at("inverse_matrix"), matrix, joints.len(), columns)?;
-        }
         Ok(())
     }
+}
+
+fn wrong_length(key: &str, name: &str, found: usize, expected: usize, what: &str) -> FormatError {
+    FormatError::new(
+        format!("{key}.{name}"),
+        format!("{found} entries for {expected} {what}"),
+        format!("give one value, or one for each of the {expected} {what}"),
+    )
 }
 
 fn check_matrix(key: &str, matrix: &[Vec<f64>], rows: usize, columns: usize) -> Result<(), FormatError> {

@@ -61,6 +61,19 @@ impl Lines {
         Ok(self.line.end == self.filled)
     }
 
+    /// Up to `most` bytes after the current line, which remain to be read.
+    pub(super) fn ahead(&mut self, most: usize) -> Result<&[u8], RecordingError> {
+        while self.filled - self.line.end < most && !self.ended {
+            self.read_on()?;
+        }
+        Ok(&self.buffer[self.line.end..self.filled.min(self.line.end + most)])
+    }
+
+    /// Moves over `count` lines of any content.
+    pub(super) fn skip(&mut self, count: u64) -> Result<(), RecordingError> {
+        (0..count).try_for_each(|_| self.next_line())
+    }
+
     /// The current line (see [`advance`](Self::advance)) without byte-order mark, newline and carriage return.
     pub(super) fn line(&self) -> &[u8] {
         let line = &self.buffer[self.line.clone()];

@@ -1,6 +1,6 @@
 //! Conversion of columns to joint values: unit, sign, scale, matrix, offset.
 
-use super::channels::{ChannelGroup, ColumnRef};
+use super::channels::{ChannelGroup, ColumnRef, OneOrMany};
 use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
 
@@ -18,6 +18,16 @@ impl Mapping {
         let joints = names.len();
         let columns = group.columns_of(key, names)?.len();
         let factor = |column: usize| group.factor(quantity, column);
+        let offset = (0..joints).map(|joint| group.offset.as_ref().and_then(|o| o.at(joint)).unwrap_or(0.0)).collect();
+        if let Some(sum) = &group.sum {
+            let of_joint = |joint: usize| {
+                let term = |(at, value): (usize, &OneOrMany<f64>)| {
+                    (at * joints + joint, value.at(joint).unwrap_or(0.0) * factor(joint))
+                };
+                sum.iter().enumerate().map(term).collect()
+            };
+            return Ok(Self { terms: (0..joints).map(of_joint).collect(), offset });
+        }
         let matrix = match (&group.matrix, &group.inverse_matrix) {
             (Some(matrix), _) => Some(matrix.clone()),
             (None, Some(matrix)) => Some(inverse(matrix).ok_or_else(|| {
@@ -38,7 +48,6 @@ impl Mapping {
                     .collect(),
             })
             .collect();
-        let offset = (0..joints).map(|joint| group.offset.as_ref().and_then(|o| o.at(joint)).unwrap_or(0.0)).collect();
         Ok(Self { terms, offset })
     }
 
@@ -89,9 +98,13 @@ impl ChannelGroup {
     ) -> Result<Vec<(ColumnRef, Vec<f64>)>, FormatError> {
         let key = quantity.key();
         self.validate(quantity, joints)?;
-        if self.matrix.is_some() || self.inverse_matrix.is_some() {
+        if self.matrix.is_some() || self.inverse_matrix.is_some() || self.sum.is_some() {
             let problem = "values of the joints are converted to columns by unit, scale, sign and offset only";
-            return Err(FormatError::new(format!("{key}.matrix"), problem, "remove the matrix for this command"));
+            return Err(FormatError::new(
+                format!("{key}.matrix"),
+                problem,
+                "remove the matrix or sum for this command",
+            ));
         }
         let columns = self.columns_of(key, joints)?;
         let converted = columns.into_iter().zip(values).enumerate().map(|(joint, (column, values))| {
@@ -185,6 +198,26 @@ mod tests {
         let mut out = vec![Vec::new()];
         mapping.apply(&[vec![90.0]], &mut out);
         assert!((out[0][0] - (1.0 - core::f64::consts::PI)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_sum_is_the_torque_of_a_position_controller() {
+        let text = "columns = [0, 1, 2, 3, 4, 5]\nsum = [[100.0, 50.0], [-100.0, -50.0], 1.0]\nsign = [1.0, -1.0]";
+        let group = group(text);
+        group.validate(Quantity::Torque, &joints(2)).unwrap();
+        let mapping = Mapping::new(&group, Quantity::Torque, &joints(2)).unwrap();
+        let mut out = vec![Vec::new(); 2];
+        // Commands, positions and feed-forward of both joints.
+        mapping.apply(&[vec![0.5], vec![0.75], vec![0.25], vec![1.0], vec![3.0], vec![-2.0]], &mut out);
+        assert_eq!(out, [[100.0 * 0.25 + 3.0], [50.0 * 0.25 + 2.0]]);
+        let problem = |text: &str| {
+            let group: ChannelGroup = toml::from_str(text).unwrap();
+            group.validate(Quantity::Torque, &joints(2)).unwrap_err().to_string()
+        };
+        assert!(problem("columns = [0, 1, 2]\nsum = [1.0, -1.0]").contains("3 columns for 2 factors"));
+        assert!(problem("columns = [0, 1]\nsum = [[1.0]]").contains("torque.sum"));
+        assert!(problem("columns = [0, 1]\nsum = [1.0]\nmatrix = [[1.0, 0.0], [0.0, 1.0]]").contains("torque.sum"));
+        assert!(problem("columns = [0, 1]\nsum = []").contains("torque.columns"));
     }
 
     #[test]

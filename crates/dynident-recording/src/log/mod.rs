@@ -31,6 +31,7 @@ mod shared_samples;
 mod source;
 mod split_stamps;
 mod stamps;
+mod table_start;
 mod text;
 mod text_columns;
 mod units;

@@ -7,7 +7,8 @@ use super::lines::Lines;
 use super::plain_row::read_plain_row;
 use super::row_labels::RowLabels;
 use super::source::LogTable;
-use super::text_columns::{Column, are_second_names, are_units, columns, guessed_delimiter, split};
+use super::table_start::{HEAD_BYTES, TableStart, number_repeated_stamps};
+use super::text_columns::{Column, are_second_names, are_units, columns, guessed_delimiter, split, text_of};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use std::io::Read;
@@ -57,6 +58,8 @@ impl TextTable {
     ) -> Result<Self, RecordingError> {
         let label = path.display().to_string();
         let mut lines = Lines::new(path, text);
+        let start = TableStart::find(lines.ahead(HEAD_BYTES)?, delimiter.map(|delimiter| delimiter as u8));
+        lines.skip(start.preamble_lines)?;
         if !lines.advance()? {
             return Err(RecordingError::NoRows { place: LogPlace::Line { log: label, line: lines.number() } });
         }
@@ -68,23 +71,25 @@ impl TextTable {
             return Err(RecordingError::CarriageReturns { file: path.to_owned(), line: lines.number() });
         }
         let delimiter = delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
-        let comma = delimiter != b',';
+        let (comma, is_automatic) = (delimiter != b',', header == Header::Auto);
         let texts = |line: &[u8], fields: &[(usize, usize)]| -> Vec<String> {
-            fields.iter().map(|(from, to)| String::from_utf8_lossy(&line[*from..*to]).into_owned()).collect()
+            fields.iter().map(|(from, to)| text_of(&line[*from..*to])).collect()
         };
         let mut fields = Vec::new();
         split(first, delimiter, &mut fields);
         let has_header = match header {
             Header::Present => true,
             Header::Absent => false,
-            Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to], comma).is_some()),
+            Header::Auto => {
+                !start.is_row && !fields.iter().all(|(from, to)| number(&first[*from..*to], comma).is_some())
+            }
         };
         let header_line = lines.number();
         let header = has_header.then(|| first.to_vec());
         let (mut names, mut units, mut first_row_is_pending) = (None, None, true);
         let mut row = fields.clone();
         if has_header {
-            names = Some(texts(first, &fields));
+            names = Some(number_repeated_stamps(texts(first, &fields)));
             first_row_is_pending = lines.advance()?;
             split(lines.line(), delimiter, &mut row);
             if first_row_is_pending && row.len() == fields.len() && are_units(lines.line(), &row) {
@@ -101,6 +106,16 @@ impl TextTable {
                 first_row_is_pending = lines.advance()?;
                 split(lines.line(), delimiter, &mut row);
             }
+            while first_row_is_pending && lines.number() < start.first_row {
+                first_row_is_pending = lines.advance()?;
+                split(lines.line(), delimiter, &mut row);
+            }
+            // A column of comments has a name and no fields.
+            if start.first_row > 0 {
+                fields.truncate(row.len());
+            }
+        } else if is_automatic {
+            names = start.names.filter(|names| names.len() == fields.len());
         }
         let columns = columns(lines.line(), &row, fields.len());
         let labelled = names.as_ref().and_then(|names| RowLabels::find(names, &columns, lines.line(), &row));

@@ -18,6 +18,12 @@ pub(super) struct Column {
     pub(super) entry: Option<(usize, usize)>,
 }
 
+/// The text of a field; Latin-1 if it is not UTF-8, as in files of Excel: `[°]`.
+pub(super) fn text_of(field: &[u8]) -> String {
+    let latin = || field.iter().map(|byte| char::from(*byte)).collect();
+    core::str::from_utf8(field).map_or_else(|_| latin(), str::to_owned)
+}
+
 pub(super) fn guessed_delimiter(line: &[u8]) -> u8 {
     // Tabs and semicolons are tried first, because files with these separators may have decimal commas.
     for delimiter in *b"\t;," {

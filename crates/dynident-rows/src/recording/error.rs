@@ -71,10 +71,11 @@ pub enum LogError {
         /// Positions and velocities at that time.
         at: String,
     },
-    /// The log is too short for the parallel filter, which needs several samples for each row of the fit. Use a longer
-    /// log, a higher cut-off, or `parallel_filter.enabled = false`.
+    /// The log is too short for the parallel filter, which needs several samples for each row of the fit. If the
+    /// message names a problem of the log, such as angles that wrap, correct it first: it lowers the cut-off. Otherwise
+    /// use a longer log, a higher cut-off, or `parallel_filter.enabled = false`.
     #[error(
-        "log `{log}`: the parallel filter makes no row from {rows} samples, because it needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
+        "log `{log}`: the parallel filter makes no row from {rows} samples, because it needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false{cause}"
     )]
     NothingLeft {
         /// Log.
@@ -83,6 +84,8 @@ pub enum LogError {
         rows: u64,
         /// Samples that one filtered row needs.
         needed: usize,
+        /// A problem of the log that lowers the cut-off, after a semicolon; empty without one.
+        cause: String,
     },
     /// The samples of this log cannot be used in the fit, for example because a value is too large. The text after the
     /// name contains the cause.

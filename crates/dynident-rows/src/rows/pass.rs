@@ -16,7 +16,7 @@ use crate::recording::{LogError, MotionRecord, Recording, Samples};
 use crate::regressor_model::RegressorModel;
 use core::borrow::Borrow;
 use dynident_dynamics::Column;
-use dynident_recording::{DecimationSettings, ImportReport, MotionBlock, MotionSettings, MotionStream};
+use dynident_recording::{DecimationSettings, Finding, ImportReport, Level, MotionBlock, MotionSettings, MotionStream};
 use std::sync::OnceLock;
 
 /// Properties of a recording after a pass.
@@ -166,7 +166,13 @@ impl LogPass<'_> {
     ) -> Result<LogStatistics, LogError> {
         if filtered_rows == 0 {
             let log = self.recording.name.clone();
-            return Err(LogError::NothingLeft { log, rows: passed.samples, needed });
+            // Jumps of a position lower the cut-off, so that the filter needs more samples.
+            let mut findings = report.iter().flat_map(|report| &report.findings);
+            let problem = findings.find(|finding| finding.level == Level::Problem);
+            let cause = problem.map_or_else(String::new, |Finding { channel, message, .. }| {
+                format!("; first correct this problem of the log: {channel}: {message}")
+            });
+            return Err(LogError::NothingLeft { log, rows: passed.samples, needed, cause });
         }
         let filtered_rate_hz = rate_hz / filter.map_or(1, |settings| settings.factor) as f64;
         Ok(LogStatistics {

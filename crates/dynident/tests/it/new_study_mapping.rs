@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Time, positions and torques of two joints; the torques are those of a pendulum and noise.
-fn rows() -> Vec<[f64; 5]> {
+pub(crate) fn rows() -> Vec<[f64; 5]> {
     let mut random = Random(5);
     (0..1500)
         .map(|row| {
@@ -34,7 +34,7 @@ fn csv(folder: &Path, columns: &[(&str, usize, f64)]) -> PathBuf {
 }
 
 /// A robot with two joints of these names.
-fn robot(folder: &Path, names: [&str; 2]) -> PathBuf {
+pub(crate) fn robot(folder: &Path, names: [&str; 2]) -> PathBuf {
     let path = folder.join("robot.urdf");
     let text = std::fs::read_to_string(repository("robots/planar2r.urdf")).unwrap();
     std::fs::write(
@@ -46,12 +46,16 @@ fn robot(folder: &Path, names: [&str; 2]) -> PathBuf {
 }
 
 fn written(robot: &Path, log: &Path) -> Result<(NewStudyFile, Study), String> {
+    written_of(robot, &[log.to_owned()])
+}
+
+pub(crate) fn written_of(robot: &Path, logs: &[PathBuf]) -> Result<(NewStudyFile, Study), String> {
     let request = NewStudy {
         robot: robot.to_owned(),
         description: None,
         xacro: XacroSettings::default(),
-        logs: vec![log.to_owned()],
-        out: log.parent().unwrap().join("study.toml"),
+        logs: logs.to_vec(),
+        out: logs[0].parent().unwrap().join("study.toml"),
         rate_hz: None,
         stated: Vec::new(),
     };
@@ -61,7 +65,7 @@ fn written(robot: &Path, log: &Path) -> Result<(NewStudyFile, Study), String> {
     Ok((found, study))
 }
 
-fn doubts(found: &NewStudyFile) -> String {
+pub(crate) fn doubts(found: &NewStudyFile) -> String {
     found.unsure.iter().map(Unsure::sentence).collect::<Vec<_>>().join("\n")
 }
 

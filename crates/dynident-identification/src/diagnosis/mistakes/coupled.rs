@@ -76,7 +76,7 @@ impl MistakeKind for Coupled {
         let of = |channels: Channels| {
             let (group, table) = keys.group(channels);
             let has = |matrix: fn(&ChannelGroup) -> bool| group.is_some_and(matrix);
-            if has(|group| group.matrix.is_some() || group.inverse_matrix.is_some()) {
+            if has(|group| group.matrix.is_some() || group.inverse_matrix.is_some() || group.sum.is_some()) {
                 let line = format!("# matrix: rows {} and {} are coupled", joint + 1, with + 1);
                 return KeyChange { table, line };
             }

@@ -4,6 +4,7 @@ use super::meaning::{JointKey, Meaning, Source, is_quantity, meaning, of_file};
 use super::quantity::Quantity;
 use super::units::with_unit;
 use crate::result::LogContents;
+use core::cmp::Reverse;
 use std::path::Path;
 
 /// How the quantity of a family of columns was determined.
@@ -13,7 +14,9 @@ pub(in crate::jobs) enum Basis {
     FileName,
     /// By the order of columns without names.
     Order,
-    /// Assumed, from the number of columns alone.
+    /// The columns have the names of joints and nothing else.
+    JointNames,
+    /// Nothing but the number of columns.
     Assumption,
 }
 
@@ -76,7 +79,13 @@ impl Family {
         (self.source.min(Source::Unstated), is_known, self.columns.len(), is_named, self.source)
     }
 
-    /// Number of words (except quantities) that only one of both names has: `arm1_pos` belongs to `arm1_torque`.
+    /// A guess among equals: a joint's own `q` before the motor's `theta`, and `q` before `q_ik`.
+    fn plainness(&self) -> (bool, Reverse<usize>) {
+        let is_of_motor = self.stem.split('_').any(|word| ["motor", "theta"].contains(&word));
+        (!is_of_motor, Reverse(self.stem.split('_').count()))
+    }
+
+    /// Number of words, apart from quantities, that only one of both names has: `arm1_pos` belongs to `arm1_torque`.
     fn distance(&self, other: Option<&Self>) -> usize {
         let words =
             |family: &Self| family.stem.split('_').map(str::to_owned).filter(|word| !is_quantity(word)).collect();
@@ -163,8 +172,10 @@ pub(in crate::jobs) fn families_without_quantity<'a>(
             let found_meaning = meaning(&with_unit(&channel.name, channel.unit.as_deref()), joints);
             let Meaning { quantity: None, is_part: false, joint, source, unit, stem } = found_meaning else { continue };
             if matches!(joint, JointKey::Joint(_) | JointKey::Number(_)) {
+                let is_name = |joint: &String| joint.eq_ignore_ascii_case(&channel.name);
+                let basis = if joints.iter().any(is_name) { Basis::JointNames } else { Basis::Assumption };
                 let column = (joint, channel.name.clone());
-                let kind = (quantity, source, Basis::Assumption);
+                let kind = (quantity, source, basis);
                 add(&mut found, Family::of_column(file, channel.group, kind, (unit, stem, column)));
             }
         }
@@ -173,8 +184,13 @@ pub(in crate::jobs) fn families_without_quantity<'a>(
     found
 }
 
+/// Whether the columns have no names, or are the entries of one array without a meaning: `M[0]`, `M[1]`.
 fn is_nameless(contents: &LogContents) -> bool {
-    contents.channels.iter().enumerate().all(|(at, channel)| channel.name == at.to_string())
+    let array = contents.channels.first().and_then(|channel| channel.name.strip_suffix("[0]"));
+    let array = array.filter(|array| of_file(array).0.is_none());
+    let is_entry = |at: usize, name: &str| array.is_some_and(|array| name == format!("{array}[{at}]"));
+    let mut channels = contents.channels.iter().enumerate();
+    channels.all(|(at, channel)| channel.name == at.to_string() || is_entry(at, &channel.name))
 }
 
 fn is_message(contents: &LogContents, group: usize) -> bool {
@@ -225,7 +241,7 @@ pub(in crate::jobs) fn best(
     best_next_to(families, quantity, None, fits)
 }
 
-/// Like [`best`]; among equal families, the one whose name is most similar to that of `other`.
+/// As [`best`]; of equals, the one whose name is most similar to that of `other`, then the plainest one.
 pub(in crate::jobs) fn best_next_to<'a>(
     families: &'a [Family],
     quantity: Quantity,
@@ -233,7 +249,7 @@ pub(in crate::jobs) fn best_next_to<'a>(
     fits: impl Fn(&Family) -> bool,
 ) -> Option<&'a Family> {
     let of_quantity = families.iter().filter(|family| family.quantity == quantity && fits(family));
-    of_quantity.rev().max_by_key(|family| (family.rank(), core::cmp::Reverse(family.distance(other))))
+    of_quantity.rev().max_by_key(|family| (family.rank(), Reverse(family.distance(other)), family.plainness()))
 }
 
 /// Another family in the file of `chosen` that differs from it only in its position in the file.

@@ -52,10 +52,11 @@ pub(in crate::jobs) struct Meaning {
     pub(in crate::jobs) stem: String,
 }
 
-const POSITIONS: [&str; 11] =
-    ["q", "qs", "pos", "position", "positions", "angle", "angles", "theta", "jointpos", "jointposition", "phi"];
-const VELOCITIES: [&str; 14] = [
+const POSITIONS: [&str; 12] =
+    ["q", "qs", "qpos", "pos", "position", "positions", "angle", "angles", "theta", "jointpos", "jointposition", "phi"];
+const VELOCITIES: [&str; 15] = [
     "dq",
+    "qvel",
     "dqs",
     "qd",
     "vels",
@@ -71,8 +72,9 @@ const VELOCITIES: [&str; 14] = [
     "jointvel",
 ];
 const ACCELERATIONS: [&str; 7] = ["ddq", "qdd", "qddot", "acc", "accel", "acceleration", "accelerations"];
-const TORQUES: [&str; 13] = [
+const TORQUES: [&str; 14] = [
     "tau",
+    "qfrc",
     "taus",
     "eff",
     "couple",
@@ -87,8 +89,9 @@ const TORQUES: [&str; 13] = [
     "jointtorque",
 ];
 const CURRENTS: [&str; 5] = ["current", "currents", "curr", "amps", "ampere"];
-const COMMANDED: [&str; 25] = [
+const COMMANDED: [&str; 26] = [
     "cmd",
+    "ctrl",
     "cmds",
     "command",
     "commands",
@@ -114,10 +117,10 @@ const COMMANDED: [&str; 25] = [
     "interp",
     "d",
 ];
-/// Names that contain no quantity but mean commanded positions: a command alone, and the words of a LeRobot data set.
-const COMMANDED_POSITIONS: [&str; 9] =
-    ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action"];
-/// Beginning of the names of command columns in a SAGE recording.
+/// Names without a quantity that are positions: a command alone, and the words of a LeRobot data set.
+const COMMANDED_POSITIONS: [&str; 10] =
+    ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action", "ctrl"];
+/// Beginning of the columns of the commands in a SAGE recording.
 const SAGE_COMMANDS: &str = "control.";
 const MEASURED: [&str; 18] = [
     "actual", "act", "measured", "meas", "msr", "sensor", "sensed", "ist", "fb", "fbk", "feedback", "executed", "real",
@@ -146,9 +149,13 @@ const COMPUTED: [&str; 20] = [
     "expected",
     "reconstructed",
 ];
-/// Words for quantities that are not the complete position or torque of a joint: errors, parts of a torque, and
-/// others.
-const OTHERS: [&str; 29] = [
+/// Quantities that are not the total position or torque of a joint: errors, parts of a torque, and others.
+const OTHERS: [&str; 34] = [
+    "cos",
+    "sin",
+    "passive",
+    "bias",
+    "constraint",
     "ext",
     "external",
     "error",
@@ -238,6 +245,7 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     let is_entry = joint.is_some() || named.is_some() || number.is_some();
     let of_entries = match &words[..] {
         [word] if COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
+        [joint, word] if joint == "joint" && COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
         [first, second] if first == "observation" && second == "state" => Some(Quantity::Position),
         [.., first, second] if first == "joint" && ["state", "states"].contains(&&second[..]) => {
             Some(Quantity::Position)
@@ -323,8 +331,9 @@ fn split_camel_case(name: &str) -> String {
     let mut text = String::with_capacity(name.len() + 4);
     let (mut earlier, mut before) = (' ', ' ');
     for c in name.chars() {
-        // The units `mNm` and `kNm` are not split.
-        let is_prefix = c == 'N' && ['m', 'k'].contains(&before) && !earlier.is_alphabetic();
+        // Not in the units `mNm`, `kNm` and `mA`.
+        let is_unit = c == 'N' && ['m', 'k'].contains(&before) || c == 'A' && before == 'm';
+        let is_prefix = is_unit && !earlier.is_alphabetic();
         if before.is_lowercase() && c.is_uppercase() && !is_prefix {
             text.push('_');
         }
@@ -427,6 +436,7 @@ mod tests {
             ("axis 3 act angle [deg]", Some(Position), Number(3), Source::Measured, Some("deg")),
             ("tau2(mNm)", Some(Torque), Number(2), Source::Unstated, Some("mN m")),
             ("tau2_mNm", Some(Torque), Number(2), Source::Unstated, Some("mN m")),
+            ("current2 [mA]", Some(Current), Number(2), Source::Unstated, Some("mA")),
             ("tau2 [Ncm]", Some(Torque), Number(2), Source::Unstated, Some("N cm")),
             ("tau2 [N*m]", Some(Torque), Number(2), Source::Unstated, Some("N m")),
             ("Couple axe 2 (N·m)", Some(Torque), Number(2), Source::Unstated, Some("N m")),
@@ -465,6 +475,16 @@ mod tests {
             ("control.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
             ("state_motor.positions[Elbow]", Some(Position), Name("elbow".to_owned()), Source::Unstated, None),
             ("target", None, Alone, Source::Commanded, None),
+            ("joint_cmd_shoulder_pan_joint", Some(Position), Joint(2), Source::Commanded, None),
+            ("joint_cmd_2", Some(Position), Number(2), Source::Commanded, None),
+            ("qpos[2]", Some(Position), Number(2), Source::Unstated, None),
+            ("ctrl[2]", Some(Position), Number(2), Source::Commanded, None),
+            ("qfrc_actuator[2]", Some(Torque), Number(2), Source::Unstated, None),
+            ("qfrc_bias[2]", None, Number(2), Source::Unstated, None),
+            ("joint_pos_cos[2]", None, Number(2), Source::Unstated, None),
+            ("position_deg_2", Some(Position), Number(2), Source::Unstated, Some("deg")),
+            ("torque_nm_2", Some(Torque), Number(2), Source::Unstated, Some("N m")),
+            ("tau_a_2", Some(Torque), Number(2), Source::Unstated, None),
         ];
         for (name, quantity, joint, source, unit) in cases {
             let found = meaning(name, &joints);

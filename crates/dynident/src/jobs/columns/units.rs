@@ -114,11 +114,13 @@ pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantit
     {
         return Some((before.trim_end().to_owned(), unit, *quantity));
     }
-    // In `tau_Nm[3]` the unit precedes the index.
+    // In `tau_Nm[3]` and `tau_Nm_3` the unit precedes the index. A letter before a number may be another word.
     let (name, index) = indexed(lower);
     let name = name.trim_end();
+    let is_number_of = |ending: &str| index.starts_with('_') && ending.len() == 1;
     let before = |ending: &str| {
-        name.strip_suffix(ending).filter(|before| before.ends_with(|c: char| "_ /-".contains(c)) && before.len() > 1)
+        let before = name.strip_suffix(ending).filter(|_| !is_number_of(ending))?;
+        (before.ends_with(|c: char| "_ /-".contains(c)) && before.len() > 1).then_some(before)
     };
     let found = ENDINGS.iter().find_map(|(ending, unit, quantity)| Some((before(ending)?, *unit, *quantity)));
     found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
@@ -132,9 +134,12 @@ fn in_brackets(name: &str) -> Option<(&str, &str)> {
     Some((before, inside.trim()))
 }
 
+/// Splits a name before its index: `tau[3]`, `tau_3`.
 fn indexed(name: &str) -> (&str, &str) {
-    match name.rfind('[') {
-        Some(at) if name.ends_with(']') && at > 0 => name.split_at(at),
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    match (name.rfind('['), stem.strip_suffix('_')) {
+        (Some(at), _) if name.ends_with(']') && at > 0 => name.split_at(at),
+        (_, Some(before)) if stem.len() < name.len() => name.split_at(before.len()),
         _ => (name, ""),
     }
 }

@@ -109,7 +109,7 @@ fn assigned(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Op
         Basis::Order => "; the columns have no names",
         _ if family.in_message_order => "; the message has no joint names",
         Basis::Assumption => "; their names state no quantity",
-        Basis::ColumnNames | Basis::FileName => "",
+        Basis::ColumnNames | Basis::FileName | Basis::JointNames => "",
     };
     Some(LoggedJoints { joints, reason: format!("{reason}{unnamed}"), is_sure: unnamed.is_empty() })
 }

@@ -3,6 +3,8 @@
 mod channels;
 mod draft;
 mod drives;
+mod joint_files;
+mod locked;
 mod position_units;
 mod reasons;
 mod recognised;
@@ -15,14 +17,15 @@ use crate::error::Error;
 use crate::jobs::check::check;
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
-use crate::result::{NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::Robot;
 use dynident_recording::Level;
+use joint_files::JointFiles;
 use recognised::RecognisedColumns;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const MAX_ROUNDS: usize = 3;
 
@@ -87,8 +90,18 @@ pub fn new_study_with(
             parts.push(part);
         }
     }
-    let recorded = RecognisedColumns::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
-    let recorded = RecognisedColumns { parts, ..recorded };
+    let find = |logs: &[(&Path, LogContents)]| RecognisedColumns::find(&robot.model, logs, thresholds);
+    let of_joints = JointFiles::join(&logs).and_then(|(files, joined)| {
+        let recorded = RecognisedColumns { joint_files: Some(files), ..find(&joined).ok()? };
+        recorded.has_file_pattern(&robot.model).then_some((recorded, joined))
+    });
+    let recorded = match of_joints {
+        Some((recorded, joined)) => {
+            logs = joined;
+            recorded
+        }
+        None => RecognisedColumns { parts, ..find(&logs).map_err(Error::NewStudy)? },
+    };
     let mut draft = recorded.draft(request, &robot.model, &logs);
     for change in &request.stated {
         draft.apply(change, "As stated");

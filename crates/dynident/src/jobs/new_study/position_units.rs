@@ -103,7 +103,17 @@ impl PositionUnits {
         stated == Some("deg") || stated.is_none() && self.implausible.is_some()
     }
 
-    /// Unit of a column of `family`, and the reason if it is uncertain.
+    /// Unit of a joint that is not among the columns.
+    pub(super) fn unit_of_joint(&self, kind: JointKind, stated: Option<&'static str>) -> &'static str {
+        match (stated, kind) {
+            (Some(unit), _) => unit,
+            (None, JointKind::Prismatic) => "m",
+            (None, _) if self.implausible.is_some() => "deg",
+            (None, _) => "rad",
+        }
+    }
+
+    /// Unit of a column of `family`, and the reason for a doubt.
     fn unit(&self, place: usize, stated: Option<&'static str>) -> (&'static str, Option<String>) {
         match (stated, self.travel[place]) {
             (Some(unit @ ("m" | "mm")), _) | (Some(unit), None) => (unit, None),

@@ -15,6 +15,7 @@ pub(super) fn basis(family: &Family, what: &str, alternatives: &str) -> String {
         Basis::FileName => "by file name",
         Basis::ColumnNames => "by column names",
         Basis::Order => "by their order in the file",
+        Basis::JointNames => "by the names of joints alone",
         Basis::Assumption => "by their number alone",
     };
     let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));

@@ -4,11 +4,13 @@ use super::channels::{
     LoggedJoints, RobotJoints, in_order, logged_joints, with_numbered_names, with_partly_foreign_names,
     without_foreign_grippers,
 };
+use super::joint_files::JointFiles;
+use super::locked::{LockedJoint, is_of_other_publisher, still_places, without_other_publisher};
 use super::reasons::{alternatives, recognised};
 use super::settings::NewStudySettings;
 use crate::error::NewStudyError;
 use crate::jobs::columns::{
-    Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, equal_choice, families,
+    Basis, Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, equal_choice, families,
     families_by_order, families_without_quantity, is_unsigned, shown, time_as_toml, time_unit_s, unit as unit_of_name,
     with_unit,
 };
@@ -21,6 +23,8 @@ pub(super) struct RecognisedColumns {
     pub(super) thresholds: NewStudySettings,
     /// Joint assignment, in the order of the columns.
     pub(super) logged: LoggedJoints,
+    /// Joints in the log that are locked.
+    pub(super) locked: Vec<LockedJoint>,
     pub(super) position: Family,
     /// Torques, or commanded positions in a log without torque.
     pub(super) drive: Family,
@@ -29,7 +33,9 @@ pub(super) struct RecognisedColumns {
     pub(super) velocity_columns: Option<Vec<String>>,
     /// Indices of the recordings with these columns; a recording with torques only belongs to one of them.
     pub(super) files: Vec<usize>,
-    /// The episode of each recording, for files with several episodes.
+    /// The files of recordings with one file for each joint.
+    pub(super) joint_files: Option<JointFiles>,
+    /// The episode of each recording, for files with several.
     pub(super) parts: Vec<Option<String>>,
     pub(super) time: Option<LogClock>,
     /// Other columns that contain positions, velocities or torques.
@@ -85,14 +91,19 @@ impl RecognisedColumns {
             let known: Vec<String> =
                 all.iter().flat_map(|family| &family.columns).map(|(_, name)| name.clone()).collect();
             let is_new = |family: &Family| {
-                counts.contains(&family.columns.len()) && family.columns.iter().all(|(_, name)| !known.contains(name))
+                (counts.contains(&family.columns.len()) || family.basis == Basis::JointNames)
+                    && family.columns.iter().all(|(_, name)| !known.contains(name))
             };
             all.extend(families_without_quantity(paths(), &names, quantity).into_iter().find(is_new));
         };
         if best(&all, Quantity::Position, |_| true).is_none() {
             assume(&mut all, Quantity::Position);
         }
-        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions", &all))?.clone();
+        let found = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions", &all))?.clone();
+        let (position, apart) = without_other_publisher(found.clone(), &logs[found.file].1);
+        all.iter_mut()
+            .filter(|family| **family == found)
+            .for_each(|family| family.columns.clone_from(&position.columns));
         let position = &position;
         let same_kind = |family: &&Family| {
             (family.file, family.group, family.quantity, &family.stem)
@@ -102,6 +113,7 @@ impl RecognisedColumns {
             .iter()
             .filter(same_kind)
             .flat_map(|family| &family.columns)
+            .filter(|(_, name)| !is_of_other_publisher(position, name, &logs[position.file].1))
             .filter_map(|(key, _)| match key {
                 JointKey::Name(name) => Some(name.clone()),
                 JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
@@ -154,6 +166,26 @@ impl RecognisedColumns {
             .map(|(chosen, other)| equal_choice(&all, chosen, other, in_same_file).map(named));
 
         let (Some(of_position), Some(of_drive)) = (ordered(position), ordered(drive)) else { return Err(none()) };
+        let of_velocity = velocity.and_then(ordered);
+        let own = |file: usize| if drive.file == position.file { logs } else { &logs[file..=file] };
+        let quantities = [(own(position.file), &of_position[..]), (own(drive.file), &of_drive)];
+        let still = still_places(quantities, thresholds.max_still_share);
+        let place_of = |place: usize| {
+            let joint = logged.joints[place];
+            let carries = robot.carriers.iter().enumerate().any(|(other, carriers)| {
+                let at = logged.joints.iter().position(|logged| *logged == other);
+                carriers.contains(&joint) && at.is_some_and(|at| !still.contains(&at))
+            });
+            LockedJoint::still(joint, &of_position[place], carries)
+        };
+        let locked: Vec<LockedJoint> = still.iter().map(|place| place_of(*place)).chain(apart).collect();
+        let moving = |columns: &[String]| -> Vec<String> {
+            let places = columns.iter().enumerate().filter(|(place, _)| !still.contains(place));
+            places.map(|(_, name)| name.clone()).collect()
+        };
+        let (of_position, of_drive) = (moving(&of_position), moving(&of_drive));
+        let joints = logged.joints.iter().enumerate().filter(|(place, _)| !still.contains(place));
+        let joints = joints.map(|(_, joint)| *joint).collect();
         let has = |log: &LogContents, columns: &[String]| {
             columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
         };
@@ -188,11 +220,13 @@ impl RecognisedColumns {
         Ok(Self {
             thresholds: thresholds.clone(),
             columns: [of_position, of_drive],
-            velocity_columns: velocity.and_then(ordered),
+            velocity_columns: of_velocity.as_deref().map(moving),
             files,
             parts: vec![None; logs.len()],
             time,
-            logged,
+            logged: LoggedJoints { joints, ..logged.clone() },
+            locked,
+            joint_files: None,
             position: position.clone(),
             drive: drive.clone(),
             velocity: velocity.cloned(),

@@ -14,6 +14,9 @@ pub struct NewStudySettings {
     pub max_radian_turns: f64,
     /// Largest position of a prismatic joint, in m, that is assumed to be in metres. Default 10.
     pub max_travel_m: f64,
+    /// Largest range of the positions and of the torques of a joint that stands still, as a share of the largest range
+    /// of the other joints. Default 1e-3: a finger that holds its place moves by a few units of its encoder.
+    pub max_still_share: f64,
 }
 
 impl Default for NewStudySettings {
@@ -23,6 +26,7 @@ impl Default for NewStudySettings {
             validation_fraction: [0.7, 1.0],
             max_radian_turns: 4.0,
             max_travel_m: 10.0,
+            max_still_share: 1e-3,
         }
     }
 }
@@ -39,6 +43,7 @@ impl NewStudySettings {
         Expected::Range(to, validation_to).check("validation_fraction", validation_from)?;
         Expected::Range(0.0, 1.0).check("validation_fraction", validation_to)?;
         Expected::Positive.check("max_radian_turns", self.max_radian_turns)?;
-        Expected::Positive.check("max_travel_m", self.max_travel_m)
+        Expected::Positive.check("max_travel_m", self.max_travel_m)?;
+        Expected::Range(0.0, 1.0).check("max_still_share", self.max_still_share)
     }
 }

@@ -3,6 +3,8 @@
 use super::NewStudy;
 use super::channels::{LoggedJoints, is_numbered_next_to_names};
 use super::draft::{Draft, Table};
+use super::joint_files::GroupColumns;
+use super::locked::{LockedJoint, range};
 use super::position_units::{PositionUnits, one_or_list};
 use super::reasons::basis;
 use super::recognised::{LogClock, RecognisedColumns};
@@ -10,6 +12,7 @@ use crate::jobs::columns::{Basis, Family, Quantity, Source, column_list};
 use crate::result::LogContents;
 use crate::study::{XacroSettings, relative_path};
 use dynident_model::Model;
+use dynident_recording::log::{self as recording, si_factor};
 use dynident_text::quoted;
 use std::path::Path;
 
@@ -19,13 +22,13 @@ impl RecognisedColumns {
         let from = request.out.parent().unwrap_or_else(|| Path::new(""));
         let joints = model.joints();
         let tables = [
-            vec![self.robot_table(request, model, from), self.time_table(request)],
+            vec![self.robot_table(request, model, logs, from), self.time_table(request)],
             vec![self.position_table(model, logs)],
             self.velocity_table(model, logs, from).into_iter().collect(),
             vec![if self.has_commands() {
                 self.command_table(model, logs, from)
             } else {
-                self.torque_table(logs, from)
+                self.torque_table(model, logs, from)
             }],
             self.log_tables(logs, from),
         ];
@@ -44,7 +47,7 @@ impl RecognisedColumns {
         Draft { tables }
     }
 
-    fn robot_table(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
+    fn robot_table(&self, request: &NewStudy, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let LoggedJoints { joints, reason, is_sure } = &self.logged;
         let mut table = Table::new("[robot]", "").with("file", quoted(&path_in_study(&request.robot, from)), "");
         if !request.xacro.arguments.is_empty() {
@@ -65,7 +68,43 @@ impl RecognisedColumns {
         let names: Vec<String> = joints.iter().map(|&joint| quoted(&model.joints()[joint].name)).collect();
         let locked = if joints.len() == model.dof() { "" } else { "; every other joint is locked" };
         let reason = format!("{reason}{locked}");
-        table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure)
+        let table = table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure);
+        self.with_lock(table, model, logs)
+    }
+
+    /// Adds the positions of joints of the log that are locked.
+    fn with_lock(&self, table: Table, model: &Model, logs: &[(&Path, LogContents)]) -> Table {
+        if self.locked.is_empty() {
+            return table;
+        }
+        let name = |locked: &LockedJoint| model.joints()[locked.joint].name.clone();
+        let units = PositionUnits::of(self, model, logs);
+        let file = self.position.file;
+        let own = if self.drive.file == file { logs } else { &logs[file..=file] };
+        let position = |locked: &LockedJoint| {
+            let [low, high] = range(own, &locked.column).unwrap_or_default();
+            let unit = units.unit_of_joint(model.joints()[locked.joint].kind, self.position.unit_of(&locked.column));
+            let factor = si_factor(unit, recording::Quantity::Position).unwrap_or(1.0);
+            format!("{} = {:?}", key(&name(locked)), rounded(0.5 * (low + high) * factor))
+        };
+        let reason = |locked: &LockedJoint| format!("{}: {}", name(locked), locked.reason);
+        let list = |text: &dyn Fn(&LockedJoint) -> String, separator: &str| {
+            self.locked.iter().map(text).collect::<Vec<_>>().join(separator)
+        };
+        let is_sure = self.locked.iter().all(|locked| locked.is_sure);
+        table.with_line("lock", format!("{{ {} }}", list(&position, ", ")), list(&reason, "; "), is_sure)
+    }
+
+    /// Whether one text names the files of positions and torques of all joints.
+    pub(super) fn has_file_pattern(&self, model: &Model) -> bool {
+        self.columns.iter().chain(&self.velocity_columns).all(|columns| self.group(model, columns).file.is_some())
+    }
+
+    /// The columns of a group of channels, and their file if it is not the main one.
+    fn group(&self, model: &Model, columns: &[String]) -> GroupColumns {
+        let joints: Vec<&str> = self.logged.joints.iter().map(|joint| &model.joints()[*joint].name[..]).collect();
+        let of_joints = self.joint_files.as_ref().and_then(|files| files.group(columns, &joints));
+        of_joints.unwrap_or_else(|| GroupColumns { file: None, columns: column_list(columns) })
     }
 
     fn time_table(&self, request: &NewStudy) -> Table {
@@ -107,7 +146,9 @@ impl RecognisedColumns {
     /// The reason why a choice between columns is uncertain.
     fn doubt(&self, place: usize) -> Option<String> {
         let equal = self.equals[place].as_ref()?;
-        Some(format!("{equal} may equally be meant: the names do not decide, the first in the file are taken"))
+        Some(format!(
+            "{equal} may equally be meant: the names do not decide, the plainest are taken, of equals the first in the file"
+        ))
     }
 
     fn position_table(&self, model: &Model, logs: &[(&Path, LogContents)]) -> Table {
@@ -115,8 +156,9 @@ impl RecognisedColumns {
         let table = Table::new("[format.position]", basis(&self.position, "positions", &self.alternatives[0]));
         let doubt = self.doubt(0);
         let is_sure = doubt.is_none() && !matches!(self.position.basis, Basis::Order | Basis::Assumption);
-        let table =
-            table.with_line("columns", column_list(columns), doubt.as_ref().unwrap_or(&self.logged.reason), is_sure);
+        let GroupColumns { file, columns: list } = self.group(model, columns);
+        let table = file.into_iter().fold(table, |table, file| table.with("file", file, "one file for each joint"));
+        let table = table.with_line("columns", list, doubt.as_ref().unwrap_or(&self.logged.reason), is_sure);
         PositionUnits::of(self, model, logs).with_unit(table, &self.position, columns)
     }
 
@@ -128,7 +170,8 @@ impl RecognisedColumns {
             "[format.velocity]",
             format!("Compared with the derivative of the positions{}", self.alternatives[1]),
         );
-        let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
+        let (table, list) = self.with_file(table, family, columns, model, logs, from);
+        let table = table.with("columns", list, "");
         Some(match stated_units(family, columns, "rad/s") {
             Some(units) => table.with("unit", units, "by the names"),
             None if family.unit.is_none() && PositionUnits::of(self, model, logs).are_degrees(self.position.unit) => {
@@ -141,36 +184,37 @@ impl RecognisedColumns {
     fn command_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
         let reason = format!(
-            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot",
+            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot. With known gains of the position controllers (MIT mode), `sum` in [format.torque] gives the torque instead: `dynident docs recordings-mit-mode`",
             basis(&self.drive, "positions", &self.alternatives[2])
         );
-        let table = self.with_file(Table::new("[format.command]", reason), &self.drive, logs, from);
-        let table = table.with("columns", column_list(columns), "");
+        let table = Table::new("[format.command]", reason);
+        let (table, list) = self.with_file(table, &self.drive, columns, model, logs, from);
+        let table = table.with("columns", list, "");
         PositionUnits::of(self, model, logs).with_unit(table, &self.drive, columns)
     }
 
-    fn torque_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+    fn torque_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
         let table = Table::new("[format.torque]", basis(&self.drive, "torques", &self.alternatives[2]));
-        let table = self.with_file(table, &self.drive, logs, from);
+        let (table, list) = self.with_file(table, &self.drive, columns, model, logs, from);
         let table = match self.drive.source {
             Source::Commanded => {
-                table.with_unsure("columns", column_list(columns), "commanded, not measured: no other torque was found")
+                table.with_unsure("columns", list, "commanded, not measured: no other torque was found")
             }
-            Source::Computed => {
-                table.with_unsure("columns", column_list(columns), "computed, not measured: no other torque was found")
-            }
+            Source::Computed => table.with_unsure("columns", list, "computed, not measured: no other torque was found"),
             Source::Unstated | Source::Measured | Source::Filtered => {
                 let doubt = match self.drive.basis {
                     Basis::Order => Some("the columns have no names: assigned in order".to_owned()),
-                    Basis::Assumption => Some("their names state no quantity: no other torque was found".to_owned()),
+                    Basis::JointNames | Basis::Assumption => {
+                        Some("their names state no quantity: no other torque was found".to_owned())
+                    }
                     _ if is_numbered_next_to_names(&self.drive, &self.position) => {
                         Some("numbers in place of names: assigned in the order of the robot description".to_owned())
                     }
                     Basis::ColumnNames | Basis::FileName => self.doubt(1),
                 };
                 let is_sure = doubt.is_none();
-                table.with_line("columns", column_list(columns), doubt.unwrap_or_default(), is_sure)
+                table.with_line("columns", list, doubt.unwrap_or_default(), is_sure)
             }
         };
         if self.drive.quantity == Quantity::Current {
@@ -184,14 +228,27 @@ impl RecognisedColumns {
         }
     }
 
-    /// Adds the file name for columns in another file than the positions, relative to the folder of the positions.
-    fn with_file(&self, table: Table, family: &Family, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+    /// Adds the file of `columns` if it is not the main one, relative to the folder of the positions; returns the
+    /// columns in the notation of a study.
+    fn with_file(
+        &self,
+        table: Table,
+        family: &Family,
+        columns: &[String],
+        model: &Model,
+        logs: &[(&Path, LogContents)],
+        from: &Path,
+    ) -> (Table, String) {
+        let GroupColumns { file, columns } = self.group(model, columns);
+        if let Some(file) = file {
+            return (table.with("file", file, ""), columns);
+        }
         if family.file == self.position.file {
-            return table;
+            return (table, columns);
         }
         let folder = logs[self.position.file].0.parent().unwrap_or(from);
         let file = quoted(&path_in_study(logs[family.file].0, folder));
-        table.with("file", file, "a separate file with the same number of rows")
+        (table.with("file", file, "a separate file with the same number of rows"), columns)
     }
 
     fn log_tables(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
@@ -226,8 +283,14 @@ fn stated_units(family: &Family, columns: &[String], usual: &'static str) -> Opt
     units.iter().any(|unit| *unit != usual).then(|| one_or_list(&units))
 }
 
+/// A position without the rounding of its unit.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
 fn key(name: &str) -> String {
-    if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
+    let is_bare = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'));
+    if is_bare && !name.is_empty() { name.to_owned() } else { quoted(name) }
 }
 
 /// `path` relative to `folder`, written with `/`; unchanged if there is no relative path.
