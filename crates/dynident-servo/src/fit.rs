@@ -249,8 +249,8 @@ impl Searcher<'_> {
         Some(covariance)
     }
 
-    /// Error of the coordinates by the length of the time steps: twice their change with steps of half the length, as for
-    /// an error of first order (Richardson), which dry friction has. The change is one step of the search.
+    /// Error of the coordinates by the length of the time steps: twice their change with steps of half the length, as
+    /// for an error of first order (Richardson), which dry friction has. The change is one step of the search.
     fn shift_by_step(&mut self, z: &[f64]) -> Option<DVector<f64>> {
         self.stepping.step_s *= 0.5;
         let point = self.point(z)?;
