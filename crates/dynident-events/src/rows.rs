@@ -43,6 +43,8 @@ pub(crate) struct LogRows {
     pub(crate) columns: Vec<Vec<f64>>,
     /// Number of columns of each joint.
     pub(crate) width: Vec<usize>,
+    /// Weight of each bin in the fits, by joint.
+    pub(crate) weight: Vec<Vec<f64>>,
     /// Velocity of the narrow friction step of each joint.
     pub(crate) step: Vec<f64>,
     /// Velocity of each joint below which it rests.
@@ -235,6 +237,7 @@ impl LogRows {
             from = to;
         }
         self.scale_columns();
+        self.weight = vec![vec![1.0; bins]; joints];
     }
 
     /// Gives every column the root mean square 1. Bins with values that are not finite become unusable.
@@ -276,6 +279,15 @@ impl LogRows {
             let is_near = |[from, to]: &[f64; 2]| *time_s > from - margin_s && *time_s < to + margin_s;
             *usable &= !intervals.iter().any(is_near);
         }
+    }
+
+    /// The same rows with the weight `1 / variance` of each bin, relative to the median of the joint.
+    pub(crate) fn weighted(&self, variance: &[Vec<f64>]) -> Self {
+        let of_joint = |variance: &Vec<f64>| -> Vec<f64> {
+            let usual = median(variance.clone());
+            variance.iter().map(|variance| usual / variance.max(f64::MIN_POSITIVE)).collect()
+        };
+        Self { weight: variance.iter().map(of_joint).collect(), samples: Vec::new(), ..self.clone() }
     }
 
     /// Whether any joint moves in a bin.
