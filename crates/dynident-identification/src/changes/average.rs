@@ -86,9 +86,9 @@ impl DescriptionDifferences {
     /// Mean and covariance of the difference of all bodies from the description under an explanation.
     fn posterior(&self, explanation: &Explanation) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut prior = self.spreads[explanation.covariance].clone();
-        for &group in &explanation.groups {
+        for (&group, scale) in explanation.groups.iter().zip(&explanation.scales) {
             let (first, unknowns) = (10 * self.bodies[group], &self.unknowns[group]);
-            let own = unknowns * unknowns.transpose() * explanation.scale.powi(2);
+            let own = unknowns * unknowns.transpose() * scale.powi(2);
             let mut block = prior.view_mut((first, first), (10, 10));
             block += own;
         }

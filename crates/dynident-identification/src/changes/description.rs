@@ -73,8 +73,15 @@ const SMALL_PROBABILITY: f64 = 0.5;
 /// Expected common factor of all values of a body that changed, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
 
-/// Prior probability that a body changed in one of the two ways: a load, or a common factor of all its values.
+/// Expected common factor with a load, relative to that without: most of a load near the centre of mass of its body is
+/// a factor, and the rest is small.
+const FACTOR_WITH_LOAD: f64 = 5.0;
+
+/// Prior probability that a body changed in one of the three ways: a load, a common factor of all its values, or both.
 const CHANGE_PROBABILITY: f64 = 0.025;
+
+/// Factors of the error bars, with the same probability: bars for correlated residuals can be twice too wide.
+const ERROR_FACTORS: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Expected difference of a term relative to its value: descriptions do not contain the friction of the real drive.
 const UNKNOWN_TERM_RATIO: f64 = 50.0;
@@ -129,10 +136,10 @@ impl DescriptionDifferences {
             place.map_or(1.0, |k| values[k].abs() + covariance[(k, k)].max(0.0).sqrt())
         };
         let all = effects(base).select_rows(rows);
-        let mut covariance = covariance.clone();
+        let mut of_terms = DMatrix::zeros(rows.len(), rows.len());
         for (place, term) in robot.terms().iter().enumerate() {
             let effect = all.column(inertial + place) * (UNKNOWN_TERM_RATIO * size(term));
-            covariance += &effect * effect.transpose();
+            of_terms += &effect * effect.transpose();
         }
         let effects = all.columns(0, inertial).into_owned();
         let of_shape = &spread * spread.transpose();
@@ -143,11 +150,27 @@ impl DescriptionDifferences {
         }
         let of = |own: &Spread| &of_shape * (own.shape * own.shape) + &of_scale * (own.scale * own.scale);
         let spreads: Vec<_> = SPREADS.iter().map(of).collect();
-        let covariances: Vec<_> =
-            spreads.iter().map(|own| &covariance + &effects * own * effects.transpose()).collect();
+        // Only the error bars have a factor: friction is unknown, and differences of bodies have their own sizes.
+        let with_bars = |factor: f64| covariance * (factor * factor) + &of_terms;
+        let of_spread = |own: &DMatrix<f64>| &effects * own * effects.transpose();
+        let covariances: Vec<_> = spreads
+            .iter()
+            .map(of_spread)
+            .flat_map(|own| ERROR_FACTORS.map(|factor| with_bars(factor) + &own))
+            .collect();
         let (bodies, unknowns, groups) = groups(robot, parts(robot.model(), base, rows, &size), &effects);
-        let settings = ChangeSettings { together: false, probability: CHANGE_PROBABILITY, ..ChangeSettings::default() };
-        let explanations = explanations(&difference, &covariances, &groups, &settings)?;
+        let settings = ChangeSettings {
+            together: false,
+            probability: CHANGE_PROBABILITY,
+            error_factors: vec![1.0],
+            ..ChangeSettings::default()
+        };
+        let mut explanations = explanations(&difference, &covariances, &groups, &settings)?;
+        for own in &mut explanations {
+            own.error_factor = ERROR_FACTORS[own.covariance % ERROR_FACTORS.len()];
+            own.covariance /= ERROR_FACTORS.len();
+        }
+        let covariance = covariance + of_terms;
         let mut found = Self { explanations, bodies, unknowns, difference, covariance, effects, spreads };
         let priors: Vec<f64> = found.explanations.iter().map(|own| SPREADS[own.covariance].probability()).collect();
         found.reweight(&priors);
@@ -254,8 +277,8 @@ impl DescriptionDifferences {
     }
 }
 
-/// Groups of unknowns: for each body with an effect a change of its ten values, as by a load, and a common factor of
-/// all its values. Their bodies, the change per unknown, and the effect on the base parameters.
+/// Groups of unknowns: for each body with an effect a change of its ten values, as by a load, a common factor of all
+/// its values, and both together. Their bodies, the change per unknown, and the effect on the base parameters.
 fn groups(
     robot: &ParametricModel,
     parts: Parts,
@@ -266,11 +289,16 @@ fn groups(
         let Part::Body(body) = part else { continue };
         let nominal = DMatrix::from_column_slice(10, 1, &robot.nominal()[10 * body..10 * body + 10]);
         let factor = nominal * EXPECTED_FACTOR;
-        let effect = effects.columns(10 * body, 10) * &factor;
-        bodies.extend([body, body]);
-        groups.push(ChangeGroup { name: group.name.clone(), effect });
+        let load = DMatrix::from_diagonal(&sizes);
+        let mut both = load.clone().insert_column(10, 0.0);
+        both.set_column(10, &(factor.column(0) * FACTOR_WITH_LOAD));
+        bodies.extend([body; 3]);
+        let effects = effects.columns(10 * body, 10);
+        for unknown in [&factor, &both] {
+            groups.push(ChangeGroup { name: group.name.clone(), effect: &effects * unknown });
+        }
         groups.push(group);
-        unknowns.extend([factor, DMatrix::from_diagonal(&sizes)]);
+        unknowns.extend([factor, both, load]);
     }
     (bodies, unknowns, groups)
 }
