@@ -10,7 +10,9 @@
 //! ```
 //!
 //! The scales `s` of the changes and `c` of the error bars are not known; the evidence is the mean over the values in
-//! [`ChangeSettings`]. The odds of two explanations are the ratios of evidence times prior probability.
+//! [`ChangeSettings`]. The scales of two groups have the ratios in [`PAIR_RATIOS`]: a large tool at the flange may
+//! occur together with a small change of a heavy link. The odds of two explanations are the ratios of evidence times
+//! prior probability.
 //!
 //! If everything may differ a little, the size of these small differences is not known either. [`explanations`]
 //! therefore accepts several covariances `C`, such as those of the error bars plus small differences of several sizes,
@@ -25,6 +27,12 @@ const ROUNDING: f64 = 1e-9;
 
 /// Eigenvalue of `BᵀB` relative to the largest one, below which its direction has no effect: the square of rounding.
 const MIN_EIGENVALUE: f64 = 1e-13;
+
+/// Ratios of the scales of two groups that changed together.
+const PAIR_RATIOS: [f64; 3] = [1.0, 1.0 / 3.0, 3.0];
+
+/// Number of pairs with the best evidence at equal scales that are compared at all ratios.
+const REFINED_PAIRS: usize = 16;
 
 /// A part of the robot that may have changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,8 +107,8 @@ pub struct Explanation {
     /// `dᵀ C⁻¹ d` that remains after the change, divided by the number of parameters: about 1 for a complete
     /// explanation with true error bars.
     pub remaining: f64,
-    /// The most probable scale `s` of the changes.
-    pub scale: f64,
+    /// The most probable scale `s` of the change of each group.
+    pub scales: Vec<f64>,
     /// The most probable factor `c` of the error bars.
     pub error_factor: f64,
     /// Change of the unknowns of each group, in expected sizes, with its covariance.
@@ -178,24 +186,29 @@ fn explanations_with(
         Whitened { count: n, square: d.norm_squared(), along, products, columns, settings, index, log_determinant };
 
     let prior = |count: usize| (settings.probability / (1.0 - settings.probability)).ln() * count as f64;
-    let mut found = vec![whitened.explained(&[], 0.0)];
+    let mut found = vec![whitened.explained(&[], &[], 0.0)];
     let mut single: Vec<(f64, Explanation)> =
-        (0..groups.len()).map(|group| whitened.explained(&[group], prior(1))).collect();
+        (0..groups.len()).map(|group| whitened.explained(&[group], &[1.0], prior(1))).collect();
     single.sort_by(|a, b| b.0.total_cmp(&a.0));
     let best: Vec<usize> = single.iter().take(settings.candidates).map(|(_, own)| own.groups[0]).collect();
     found.extend(single);
     if settings.most_groups > 1 {
+        let mut pairs = Vec::new();
         for (place, &a) in best.iter().enumerate() {
             // Combine the best groups with every other group: a second change may be visible only after the first is
             // explained.
             let others = (0..groups.len()).filter(|b| *b != a && !best[..place].contains(b));
-            for b in others {
-                found.push(whitened.explained(&[a.min(b), a.max(b)], prior(2)));
-            }
+            pairs.extend(others.map(|b| whitened.explained(&[a.min(b), a.max(b)], &[1.0; 2], prior(2))));
         }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for pair in pairs.iter_mut().take(REFINED_PAIRS) {
+            *pair = whitened.at_all_ratios(pair, prior(2));
+        }
+        found.extend(pairs);
     }
     if settings.together && groups.len() > settings.most_groups {
-        found.push(whitened.explained(&(0..groups.len()).collect::<Vec<_>>(), prior(1)));
+        let all: Vec<usize> = (0..groups.len()).collect();
+        found.push(whitened.explained(&all, &vec![1.0; groups.len()], prior(1)));
     }
     Ok(found)
 }
@@ -220,23 +233,38 @@ struct Whitened<'a> {
 }
 
 impl Whitened<'_> {
-    /// One decomposition for all scales, `BᵀB = V S² Vᵀ` of some columns of B: the diagonal of S², V, and `VᵀBᵀd`.
-    fn decomposed(&self, columns: &[usize]) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
+    /// A pair with the mean evidence of all ratios of its scales, and the explanation at the best ratio.
+    fn at_all_ratios(&self, equal: &(f64, Explanation), prior: f64) -> (f64, Explanation) {
+        let other = |ratio: &f64| self.explained(&equal.1.groups, &[ratio.sqrt(), ratio.sqrt().recip()], prior);
+        let mut all: Vec<(f64, Explanation)> = PAIR_RATIOS[1..].iter().map(other).collect();
+        all.push(equal.clone());
+        let log = mean_of_logarithms(all.iter().map(|(log, _)| *log));
+        let best = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or_else(|| equal.clone(), |(_, explanation)| (log, explanation))
+    }
+
+    /// One decomposition for all scales, `BᵀB = V S² Vᵀ` of some columns of B times their `factors`: the diagonal of
+    /// S², V, and `VᵀBᵀd`.
+    fn decomposed(&self, columns: &[usize], factors: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
         if columns.is_empty() {
             return (DVector::zeros(0), DMatrix::zeros(0, 0), DVector::zeros(0));
         }
-        let eigen = self.products.select_columns(columns).select_rows(columns).symmetric_eigen();
+        let products = self.products.select_columns(columns).select_rows(columns);
+        let eigen = products.component_mul(&(factors * factors.transpose())).symmetric_eigen();
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         let squares = eigen.eigenvalues.map(|square| if square > MIN_EIGENVALUE * largest { square } else { 0.0 });
-        let products = eigen.eigenvectors.tr_mul(&self.along.select_rows(columns));
+        let products = eigen.eigenvectors.tr_mul(&self.along.select_rows(columns).component_mul(factors));
         (squares, eigen.eigenvectors, products)
     }
 
-    /// Logarithm of the evidence of a set of groups plus `prior`, and the explanation without its probability.
-    fn explained(&self, groups: &[usize], prior: f64) -> (f64, Explanation) {
+    /// Logarithm of the evidence of a set of groups plus `prior`, and the explanation without its probability. `ratios`
+    /// are the scales of the groups relative to a common one.
+    fn explained(&self, groups: &[usize], ratios: &[f64], prior: f64) -> (f64, Explanation) {
         let n = self.count;
         let columns: Vec<usize> = groups.iter().flat_map(|&group| self.columns[group].clone()).collect();
-        let (squares, vectors, products) = self.decomposed(&columns);
+        let of_group = |(&group, &ratio): (&usize, &f64)| core::iter::repeat_n(ratio, self.columns[group].len());
+        let factors = DVector::from_iterator(columns.len(), groups.iter().zip(ratios).flat_map(of_group));
+        let (squares, vectors, products) = self.decomposed(&columns, &factors);
         let along =
             products.zip_map(&squares, |product, square| if square > 0.0 { product / square.sqrt() } else { 0.0 });
         let rest = (self.square - along.norm_squared()).max(0.0);
@@ -253,11 +281,11 @@ impl Whitened<'_> {
                 logs.push((log, scale, error));
             }
         }
-        let (largest, scale, error) = logs
+        let (_, scale, error) = logs
             .iter()
             .copied()
             .fold((f64::NEG_INFINITY, 1.0, 1.0), |best, own| if own.0 > best.0 { own } else { best });
-        let mean = logs.iter().map(|(log, ..)| (log - largest).exp()).sum::<f64>() / logs.len() as f64;
+        let log = mean_of_logarithms(logs.iter().map(|(log, ..)| *log));
 
         // Posterior of the unknowns at the best scale: φ = V diag(s² S / (c² + s² S²)) Uᵀ d.
         let [variance, square_scale] = [error * error, scale * scale];
@@ -275,11 +303,11 @@ impl Whitened<'_> {
             remaining +=
                 along.iter().zip(shrunk.iter()).map(|(along, shrunk)| ((1.0 - shrunk) * along).powi(2)).sum::<f64>();
             let mut start = 0;
-            for &group in groups {
+            for (&group, &ratio) in groups.iter().zip(ratios) {
                 let count = self.columns[group].len();
                 changes.push((
-                    phi.rows(start, count).into_owned(),
-                    covariance.view((start, start), (count, count)).into_owned(),
+                    phi.rows(start, count) * ratio,
+                    covariance.view((start, start), (count, count)) * (ratio * ratio),
                 ));
                 start += count;
             }
@@ -290,12 +318,19 @@ impl Whitened<'_> {
             covariance: self.index,
             probability: 0.0,
             remaining,
-            scale,
+            scales: ratios.iter().map(|ratio| scale * ratio).collect(),
             error_factor: error,
             changes,
         };
-        (largest + mean.ln() + prior - self.log_determinant, explanation)
+        (log + prior - self.log_determinant, explanation)
     }
+}
+
+/// Logarithm of the mean of numbers, from their logarithms.
+fn mean_of_logarithms(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    let (sum, count) = logs.fold((0.0, 0.0), |(sum, count), log| (sum + (log - largest).exp(), count + 1.0));
+    largest + (sum / count).ln()
 }
 
 #[cfg(test)]

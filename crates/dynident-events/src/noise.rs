@@ -1,6 +1,7 @@
 //! Usual residual of each joint in each bin, as a function of the state of motion.
 
 use crate::rows::{LogRows, median};
+use crate::scan::quiet;
 
 /// Velocity below which a joint is treated as reversing or resting, relative to its root mean square velocity.
 const REVERSAL_SHARE: f64 = 0.15;
@@ -24,6 +25,7 @@ const MIN_MODEL_ERROR: f64 = 0.002;
 /// (near reversal, slow, fast), plus a share of the dry friction near reversal.
 pub(crate) fn usual_variance(rows: &LogRows, residuals: &[Vec<f64>], friction: &[f64], kept: &[bool]) -> Vec<Vec<f64>> {
     let moving: Vec<bool> = (0..rows.len()).map(|bin| rows.is_moving(bin)).collect();
+    let is_quiet = quiet(rows);
     let of_joint = |joint: usize| -> Vec<f64> {
         let states = states(rows, joint);
         let robust = |is_state: &dyn Fn(usize) -> bool| {
@@ -34,8 +36,10 @@ pub(crate) fn usual_variance(rows: &LogRows, residuals: &[Vec<f64>], friction: &
         let floor = (MIN_MODEL_ERROR * torque).powi(2).max(f64::MIN_POSITIVE);
         let all = robust(&|_| true).max(floor);
         let level = |state: usize| robust(&|bin| states[bin] == state).max(MIN_LEVEL * all);
-        // Bins in which the whole robot rests are excluded: if the drives are off, any torque is possible there.
-        let near = robust(&|bin| states[bin] == 0 && moving[bin]).max(MIN_LEVEL * all);
+        // Friction holds a robot at rest with any torque. Without drives, the torque is zero.
+        let at_reversal = robust(&|bin| states[bin] == 0 && moving[bin]);
+        let at_rest = robust(&|bin| states[bin] == 0 && !is_quiet[bin]);
+        let near = at_reversal.max(at_rest).max(MIN_LEVEL * all);
         let levels = [near, level(1), level(2)];
         let near_reversal = (FRICTION_SHARE * friction[joint]).powi(2);
         let last = rows.len() - 1;

@@ -7,17 +7,17 @@ use nalgebra::{DMatrix, DVector};
 /// Regularisation relative to the mean diagonal; columns have similar scales.
 const RIDGE: f64 = 1e-7;
 
-/// Matrix `[W τ]ᵀ [W τ]` over some bins of one joint, with regressor W and torque τ.
+/// `[W τ]ᵀ V⁻¹ [W τ]` over some bins of one joint, with the weights of the bins.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
-    /// Number of bins.
-    pub(crate) bins: f64,
+    /// Sum of the weights of the bins.
+    pub(crate) weight: f64,
     gram: DMatrix<f64>,
 }
 
 impl Normal {
     pub(crate) fn zero(width: usize) -> Self {
-        Self { bins: 0.0, gram: DMatrix::zeros(width + 1, width + 1) }
+        Self { weight: 0.0, gram: DMatrix::zeros(width + 1, width + 1) }
     }
 
     /// Sums over a range of bins, without unusable and excluded bins. `further` appends columns to each bin.
@@ -29,11 +29,17 @@ impl Normal {
         further: impl Fn(usize, &mut Vec<f64>),
     ) -> Self {
         let kept: Vec<usize> = range.filter(|&bin| rows.usable[bin] && is_kept(bin)).collect();
-        let mut values = Vec::new();
+        let (mut values, mut weight) = (Vec::new(), 0.0);
         for &bin in &kept {
+            let first = values.len();
             values.extend_from_slice(rows.row(joint, bin));
             further(bin, &mut values);
             values.push(rows.tau[joint][bin]);
+            let own = rows.weight[joint][bin];
+            weight += own;
+            for value in &mut values[first..] {
+                *value *= own.sqrt();
+            }
         }
         if kept.is_empty() {
             let mut none = Vec::new();
@@ -43,7 +49,7 @@ impl Normal {
         let width = values.len() / kept.len();
         // Column-major storage of the transposed rows.
         let transposed = DMatrix::from_vec(width, kept.len(), values);
-        Self { bins: kept.len() as f64, gram: &transposed * transposed.transpose() }
+        Self { weight, gram: &transposed * transposed.transpose() }
     }
 
     /// Number of columns without the torque.
@@ -52,14 +58,14 @@ impl Normal {
     }
 
     pub(crate) fn add(&mut self, other: &Self) {
-        self.bins += other.bins;
+        self.weight += other.weight;
         self.gram += &other.gram;
     }
 
     /// Least squares parameters; `None` without rows.
     pub(crate) fn solution(&self) -> Option<DVector<f64>> {
         let width = self.gram.nrows() - 1;
-        if width == 0 || self.bins == 0.0 {
+        if width == 0 || self.weight == 0.0 {
             return None;
         }
         let mut matrix = self.gram.view((0, 0), (width, width)).into_owned();
@@ -71,7 +77,7 @@ impl Normal {
         Some(matrix.cholesky()?.solve(&right))
     }
 
-    /// Sum of squared residuals with these parameters.
+    /// Weighted sum of squared residuals with the given parameters.
     pub(crate) fn squares(&self, theta: &DVector<f64>) -> f64 {
         let width = theta.len();
         let product = self.gram.view((0, 0), (width, width)) * theta;

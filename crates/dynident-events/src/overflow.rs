@@ -1,6 +1,7 @@
 //! Overflow of the number format of a torque: the value jumps from one end of its range to the other.
 
 use crate::normal::Normal;
+use crate::robust::dry_friction_of_joint;
 use crate::rows::{LogRows, TorquePiece, median};
 
 /// Maximum distance of both ends of a jump from the ends of the torque's range, relative to the range.
@@ -16,7 +17,12 @@ const MIN_BINS: usize = 2;
 const MAX_NOISE_BINS: f64 = 4.0;
 /// Smallest and largest mean residual of an overflow, relative to the size of the jump.
 const JUMP_RATIO: [f64; 2] = [0.6, 1.4];
-/// Number of rounds that alternate between a fit and the classification of parts as normal or overflowed.
+/// Longest overflow at a peak, s, and minimum number of such peaks.
+const MAX_SHORT_S: f64 = 0.3;
+const MIN_SHORT_INTERVALS: usize = 2;
+/// Minimum size of its jumps relative to the dry friction, which jumps by twice its value at a reversal.
+const MIN_FRICTION_RATIO: f64 = 4.0;
+/// Rounds of fit and assignment of the parts.
 const ROUNDS: usize = 5;
 /// Maximum share of a joint's bins with overflow.
 const MAX_SHARE: f64 = 0.5;
@@ -47,17 +53,65 @@ pub(crate) fn overflows(rows: &LogRows) -> Vec<Overflow> {
 }
 
 fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
-    let (mut parts, jumps) = parts(rows, joint);
+    let (parts, jumps) = parts(rows, joint);
     if jumps.is_empty() {
         return None;
     }
     let jump_nm = median(jumps.iter().map(|(_, size)| *size).collect());
+    long_overflow(rows, joint, parts, (&jumps, jump_nm)).or_else(|| short_overflow(rows, joint, (&jumps, jump_nm)))
+}
+
+/// Overflow at peaks that are shorter than the parts of [`long_overflow`]: the torque jumps over its range and back
+/// several times, by much more than dry friction does at a reversal.
+fn short_overflow(rows: &LogRows, joint: usize, (jumps, jump_nm): (&[(f64, f64)], f64)) -> Option<Overflow> {
+    let times_s = merged(rows, intervals(jumps, MAX_SHORT_S));
+    if times_s.len() < MIN_SHORT_INTERVALS {
+        return None;
+    }
+    let is_near = |time_s: f64| {
+        let is_within = |[from, to]: &[f64; 2]| time_s > from - MAX_SHORT_S && time_s < to + MAX_SHORT_S;
+        times_s.iter().any(is_within)
+    };
+    let fit = Normal::of_range(rows, joint, 0..rows.len(), |bin| !is_near(rows.time_s[bin]), |_, _| ());
+    let theta = fit.solution()?;
+    let usual_nm = (fit.squares(&theta) / fit.weight).sqrt();
+    let friction_nm = dry_friction_of_joint(rows, joint, &theta);
+    let is_overflow =
+        jump_nm > MIN_FRICTION_RATIO * friction_nm && jump_nm.powi(2) > MIN_RESIDUAL_RATIO * usual_nm.powi(2);
+    is_overflow.then_some(Overflow { joint, times_s, jump_nm, usual_nm })
+}
+
+/// Intervals between two jumps that are at most `longest_s` apart.
+fn intervals(jumps: &[(f64, f64)], longest_s: f64) -> Vec<[f64; 2]> {
+    jumps.windows(2).map(|two| [two[0].0, two[1].0]).filter(|[from, to]| to - from <= longest_s).collect()
+}
+
+/// Intervals in order of time; those with less than a bin in between are one.
+fn merged(rows: &LogRows, mut times_s: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    times_s.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut merged: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in times_s {
+        match merged.last_mut() {
+            Some(last) if from - last[1] <= rows.bin_s => last[1] = last[1].max(to),
+            _ => merged.push([from, to]),
+        }
+    }
+    merged
+}
+
+/// Overflow of parts of the log of at least [`MIN_BINS`] bins.
+fn long_overflow(
+    rows: &LogRows,
+    joint: usize,
+    mut parts: Vec<Part>,
+    (jumps, jump_nm): (&[(f64, f64)], f64),
+) -> Option<Overflow> {
     let mut usual_nm = 0.0;
     let fit_of = |parts: &[Part], is_used: &dyn Fn(&Part) -> bool| {
         let mut used = vec![false; rows.len()];
         parts.iter().filter(|part| is_used(part)).flat_map(|part| &part.bins).for_each(|&bin| used[bin] = true);
         let fit = Normal::of_range(rows, joint, 0..rows.len(), |bin| used[bin], |_, _| ());
-        fit.solution().map(|theta| ((fit.squares(&theta) / fit.bins.max(1.0)).sqrt(), theta))
+        fit.solution().map(|theta| ((fit.squares(&theta) / fit.weight.max(1.0)).sqrt(), theta))
     };
     for _ in 0..ROUNDS {
         let theta;
@@ -83,18 +137,9 @@ fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
         return None;
     }
     let mut times_s: Vec<[f64; 2]> = parts.iter().filter(|part| part.is_wrapped).map(|part| part.times_s).collect();
-    // Noise at the limit of the range can cause several jumps in a short time.
-    let near_s = MAX_NOISE_BINS * rows.bin_s;
-    times_s.extend(jumps.windows(2).map(|two| [two[0].0, two[1].0]).filter(|[from, to]| to - from <= near_s));
-    times_s.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut merged: Vec<[f64; 2]> = Vec::new();
-    for [from, to] in times_s {
-        match merged.last_mut() {
-            Some(last) if from - last[1] <= rows.bin_s => last[1] = last[1].max(to),
-            _ => merged.push([from, to]),
-        }
-    }
-    Some(Overflow { joint, times_s: merged, jump_nm, usual_nm })
+    // Noise at the limit of the range jumps several times.
+    times_s.extend(intervals(jumps, MAX_NOISE_BINS * rows.bin_s));
+    Some(Overflow { joint, times_s: merged(rows, times_s), jump_nm, usual_nm })
 }
 
 /// Parts of the log between two jumps of a joint's torque, and time and size of each jump. Parts of less than

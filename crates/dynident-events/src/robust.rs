@@ -105,8 +105,9 @@ impl<'a> Blocks<'a> {
             let mut sum = Normal::zero(normals.first()?.width());
             normals.iter().zip(kept).filter(|(_, kept)| **kept).for_each(|(normal, _)| sum.add(normal));
             let theta = sum.solution()?;
-            let errors: Vec<f64> = normals.iter().map(|normal| normal.squares(&theta) / normal.bins.max(1.0)).collect();
-            let used = |block: &usize| kept[*block] && normals[*block].bins > 0.0;
+            let errors: Vec<f64> =
+                normals.iter().map(|normal| normal.squares(&theta) / normal.weight.max(f64::MIN_POSITIVE)).collect();
+            let used = |block: &usize| kept[*block] && normals[*block].weight > 0.0;
             let level = median((0..blocks).filter(used).map(|block| errors[block]).collect()).max(f64::MIN_POSITIVE);
             for (score, error) in scores.iter_mut().zip(&errors) {
                 *score += (error / level).min(MAX_BLOCK_ERROR);
@@ -146,14 +147,15 @@ pub(crate) fn residuals(rows: &LogRows, fit: &Fit) -> Vec<Vec<f64>> {
 
 /// Dry friction of each joint in the fit, Nm (N), evaluated at the velocity of the wider of the two friction functions.
 pub(crate) fn dry_friction(rows: &LogRows, fit: &Fit) -> Vec<f64> {
-    let of_joint = |joint: usize| {
-        let drive = rows.width[joint] - DRIVE_COLUMNS;
-        let theta = &fit[joint].as_slice()[drive..];
-        let value = |column: usize| {
-            let scale = rows.drive_scale[joint][column];
-            if scale > 1e-12 { theta[column] / scale } else { 0.0 }
-        };
-        (value(1) + value(2)).abs()
+    fit.iter().enumerate().map(|(joint, theta)| dry_friction_of_joint(rows, joint, theta)).collect()
+}
+
+/// Dry friction of a joint with these parameters, Nm (N): the step of the torque at the wide step's velocity.
+pub(crate) fn dry_friction_of_joint(rows: &LogRows, joint: usize, theta: &DVector<f64>) -> f64 {
+    let drive = rows.width[joint] - DRIVE_COLUMNS;
+    let value = |column: usize| {
+        let scale = rows.drive_scale[joint][column];
+        if scale > 1e-12 { theta[drive + column] / scale } else { 0.0 }
     };
-    (0..rows.joints()).map(of_joint).collect()
+    (value(1) + value(2)).abs()
 }

@@ -43,7 +43,9 @@ pub(crate) struct LogRows {
     pub(crate) columns: Vec<Vec<f64>>,
     /// Number of columns of each joint.
     pub(crate) width: Vec<usize>,
-    /// Velocity scale of the narrow friction function of each joint.
+    /// Weight of each bin in the fits, by joint.
+    pub(crate) weight: Vec<Vec<f64>>,
+    /// Velocity of the narrow friction step of each joint.
     pub(crate) step: Vec<f64>,
     /// Velocity of each joint below which the joint is at rest.
     pub(crate) rest: Vec<f64>,
@@ -236,6 +238,7 @@ impl LogRows {
             from = to;
         }
         self.scale_columns();
+        self.weight = vec![vec![1.0; bins]; joints];
     }
 
     /// Scales every column to a root mean square of 1. Marks bins with values that are not finite as unusable.
@@ -277,6 +280,15 @@ impl LogRows {
             let is_near = |[from, to]: &[f64; 2]| *time_s > from - margin_s && *time_s < to + margin_s;
             *usable &= !intervals.iter().any(is_near);
         }
+    }
+
+    /// The same rows with the weight `1 / variance` of each bin, relative to the median of the joint.
+    pub(crate) fn weighted(&self, variance: &[Vec<f64>]) -> Self {
+        let of_joint = |variance: &Vec<f64>| -> Vec<f64> {
+            let usual = median(variance.clone());
+            variance.iter().map(|variance| usual / variance.max(f64::MIN_POSITIVE)).collect()
+        };
+        Self { weight: variance.iter().map(of_joint).collect(), samples: Vec::new(), ..self.clone() }
     }
 
     /// Whether any joint moves in a bin.

@@ -42,7 +42,9 @@ const STOP_SHARE: f64 = 0.03;
 const STOP_TRAVEL: f64 = 0.1;
 /// Minimum mean residual torque at a stop, relative to the usual residual of the joint (squares).
 const STOP_RATIO: f64 = 9.0;
-/// Number of rounds that alternate between search and fit.
+/// Largest torque that holds a joint at rest relative to its dry friction in motion.
+const BREAKAWAY_RATIO: f64 = 2.0;
+/// Rounds of search and refit.
 const ROUNDS: usize = 4;
 /// Maximum number of intervals.
 const MAX_INTERVALS: usize = 12;
@@ -106,11 +108,11 @@ pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
             .iter()
             .filter_map(|range| judged(rows, range, &kept, (&sums, &refit), (&left, &variance), settings))
             .collect();
-        let is_event = |one: &Interval| {
-            one.is_off || one.is_stop || one.passes(settings.warn_ratio, settings.warn_prominence, settings.min_effect)
+        let confirmed = confirmed_events(rows, &found, &kept, &variance, settings);
+        let is_kept = |one: &&Interval| {
+            one.is_off || one.is_stop || one.passes_warning(settings) && confirmed.contains(&one.bins)
         };
-        let remaining: Vec<Range<usize>> =
-            judged.iter().filter(|one| is_event(one)).map(|one| one.bins.clone()).collect();
+        let remaining: Vec<Range<usize>> = judged.iter().filter(is_kept).map(|one| one.bins.clone()).collect();
         if remaining.len() == found.len() {
             return Some(Scan { intervals: judged, residuals: left, variance, kept });
         }
@@ -122,7 +124,34 @@ pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
     }
 }
 
+/// The intervals that are also events if each bin has the weight `1 / variance`. The dry friction of a joint at rest is
+/// any torque up to the breakaway torque. A fit with equal weights follows the values of some rests, and the others
+/// contradict it.
+fn confirmed_events(
+    rows: &LogRows,
+    found: &[Range<usize>],
+    kept: &[bool],
+    variance: &[Vec<f64>],
+    settings: &EventSettings,
+) -> Vec<Range<usize>> {
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let rows = &rows.weighted(variance);
+    let Some((sums, fit)) = Blocks::new(rows).fit(kept) else { return Vec::new() };
+    let left = residuals(rows, &fit);
+    let friction: Vec<f64> = dry_friction(rows, &fit).iter().map(|friction| BREAKAWAY_RATIO * friction).collect();
+    let variance = usual_variance(rows, &left, &friction, kept);
+    let judged =
+        found.iter().filter_map(|range| judged(rows, range, kept, (&sums, &fit), (&left, &variance), settings));
+    judged.filter(|one| one.passes_warning(settings)).map(|one| one.bins).collect()
+}
+
 impl Interval {
+    fn passes_warning(&self, settings: &EventSettings) -> bool {
+        self.passes(settings.warn_ratio, settings.warn_prominence, settings.min_effect)
+    }
+
     fn passes(&self, ratio: f64, prominence: f64, effect: f64) -> bool {
         (0..self.ratio.len()).any(|joint| {
             self.ratio[joint] >= ratio && self.prominence[joint] >= prominence && self.effect[joint] >= effect
@@ -177,8 +206,8 @@ fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
     found
 }
 
-/// For each bin, whether the torques of all joints are small.
-fn quiet(rows: &LogRows) -> Vec<bool> {
+/// Whether all torques of a bin are small.
+pub(crate) fn quiet(rows: &LogRows) -> Vec<bool> {
     let largest = rows.tau.iter().map(|tau| rms(tau)).fold(0.0, f64::max);
     let scale = |tau: &Vec<f64>| OFF_TORQUE_SHARE * rms(tau).max(MIN_TORQUE_SHARE * largest);
     let scales: Vec<f64> = rows.tau.iter().map(scale).collect();
@@ -239,18 +268,21 @@ fn judged(
     let largest = rows.tau.iter().map(|tau| rms(tau)).fold(f64::MIN_POSITIVE, f64::max);
     for joint in 0..joints {
         let inside = Normal::of_range(rows, joint, range.clone(), |_| true, |_, _| ());
-        if inside.bins == 0.0 {
+        if inside.weight == 0.0 {
             continue;
         }
         let mut both = sums[joint].clone();
         both.add(&inside);
         let increase = both.squares(&both.solution()?) - sums[joint].squares(&fit[joint]);
-        let excess = (increase / inside.bins).max(0.0);
-        // Bins with a small usual residual have the largest weight.
+        let excess = (increase / inside.weight).max(0.0);
+        // Bins with a well-known torque count most.
         let usual = range.len() as f64 / variance[joint][range.clone()].iter().map(|one| one.recip()).sum::<f64>();
         one.excess[joint] = excess;
         one.ratio[joint] = excess / usual;
-        one.prominence[joint] = excess / worst_window(rows, &left[joint], kept, range.len()).max(0.25 * usual);
+        let weight = &rows.weight[joint];
+        let mean_weight = weight[range.clone()].iter().sum::<f64>() / range.len() as f64;
+        let worst = worst_window(rows, (&left[joint], weight), kept, range.len()) / mean_weight;
+        one.prominence[joint] = excess / worst.max(0.25 * usual);
         one.effect[joint] = excess.sqrt() / rms(&rows.tau[joint]).max(MIN_TORQUE_SHARE * largest);
     }
     one.strongest = (0..joints).max_by(|a, b| one.ratio[*a].total_cmp(&one.ratio[*b])).unwrap_or(0);
@@ -328,9 +360,10 @@ fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[V
     is_missing && predicted > OFF_RATIO * measured
 }
 
-/// Largest mean square residual over windows of `length` bins that are in the fit.
-fn worst_window(rows: &LogRows, left: &[f64], kept: &[bool], length: usize) -> f64 {
-    let square = |bin: usize| if kept[bin] && rows.usable[bin] { left[bin].powi(2) } else { 0.0 };
+/// Largest mean weighted square residual of the kept bins over windows of this length.
+fn worst_window(rows: &LogRows, (left, weight): (&[f64], &[f64]), kept: &[bool], length: usize) -> f64 {
+    let is_used = |bin: usize| kept[bin] && rows.usable[bin];
+    let square = |bin: usize| if is_used(bin) { weight[bin] * left[bin].powi(2) } else { 0.0 };
     let length = length.min(rows.len());
     let mut sum: f64 = (0..length).map(square).sum();
     let mut worst = sum;

@@ -25,14 +25,40 @@ const MAX_STEP_RATIO: f64 = 0.7;
 /// Number of times that are first tried for a sudden change.
 const STEP_TIMES: usize = 40;
 
-/// Mean square residual of a model with the best sudden change of one joint's offset, and the first bin after the
-/// change.
+/// Parts of a log that are predicted from the other parts.
+const PARTS: usize = 10;
+
+/// Further columns of a bin.
+type Further<'a> = dyn Fn(usize, &mut Vec<f64>) + 'a;
+
+fn none(_: usize, _: &mut Vec<f64>) {}
+
+/// 1 from bin `first` on, else 0.
+fn after(first: usize, bin: usize) -> f64 {
+    f64::from(u8::from(bin >= first))
+}
+
+/// Sum of the weighted squared errors with which the other parts of the log predict each part. Of a log with few
+/// strokes, further columns explain much of the residual by chance, but predict nothing.
+fn prediction_error(rows: &LogRows, joint: usize, kept: &[bool], further: &Further<'_>) -> Option<f64> {
+    let part = |number: usize| number * rows.len() / PARTS..(number + 1) * rows.len() / PARTS;
+    let of = |number: usize| Normal::of_range(rows, joint, part(number), |bin| kept[bin], further);
+    let parts: Vec<Normal> = (0..PARTS).map(of).collect();
+    let of_part = |number: usize| {
+        let mut others = Normal::zero(parts[number].width());
+        parts.iter().enumerate().filter(|(other, _)| *other != number).for_each(|(_, other)| others.add(other));
+        others.solution().map(|theta| parts[number].squares(&theta))
+    };
+    (0..PARTS).map(of_part).sum()
+}
+
+/// Mean square residual and first bin of the best sudden change of one joint's offset.
 fn best_step(rows: &LogRows, joint: usize, kept: &[bool]) -> Option<(f64, usize)> {
     let bins = rows.len();
     let at = |first: usize| {
-        let step = |bin: usize, values: &mut Vec<f64>| values.push(f64::from(u8::from(bin >= first)));
+        let step = |bin: usize, values: &mut Vec<f64>| values.push(after(first, bin));
         let normal = Normal::of_range(rows, joint, 0..bins, |bin| kept[bin], step);
-        normal.solution().map(|theta| (normal.squares(&theta) / normal.bins, first))
+        normal.solution().map(|theta| (normal.squares(&theta) / normal.weight, first))
     };
     let least = |found: Option<(f64, usize)>, next: (f64, usize)| match found {
         Some(found) if found.0 <= next.0 => Some(found),
@@ -53,6 +79,7 @@ pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> V
         [x, 1.5 * x * x - 0.5, 2.5 * x.powi(3) - 1.5 * x]
     };
     let mut found = Vec::new();
+    let weighted = rows.weighted(&scan.variance);
     for joint in 0..rows.joints() {
         let step = rows.step[joint];
         let scale = rms(&rows.dq[joint]).max(f64::MIN_POSITIVE);
@@ -63,30 +90,40 @@ pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> V
                 values.extend([p * (dq / step).tanh(), p * dq / scale]);
             }
         };
-        let squares = |further: &dyn Fn(usize, &mut Vec<f64>)| {
+        let squares = |further: &Further<'_>| {
             let normal = Normal::of_range(rows, joint, 0..bins, |bin| scan.kept[bin], further);
-            normal.solution().map(|theta| (normal.squares(&theta) / normal.bins, normal.bins))
+            normal.solution().map(|theta| normal.squares(&theta) / normal.weight)
         };
-        let (Some((plain, _)), Some((drifting, _)), Some((warming, _))) =
-            (squares(&|_, _| ()), squares(&drift), squares(&warm_up))
-        else {
+        let (Some(plain), Some(drifting), Some(warming)) = (squares(&none), squares(&drift), squares(&warm_up)) else {
             continue;
         };
         let torque = rms(&rows.tau[joint]);
         let (kind, least) =
             if drifting <= warming { (EventKind::Drift, drifting) } else { (EventKind::WarmUp, warming) };
         let size_nm = (plain - least).max(0.0).sqrt();
-        if plain > 0.0
-            && plain - least >= settings.min_trend_share * plain
-            && size_nm >= settings.min_trend_effect * torque
+        if plain <= 0.0
+            || plain - least < settings.min_trend_share * plain
+            || size_nm < settings.min_trend_effect * torque
         {
-            let step = if kind == EventKind::Drift { best_step(rows, joint, &scan.kept) } else { None };
-            let step = step.filter(|(squares, _)| *squares < MAX_STEP_RATIO * least);
-            let (least, step) = step.map_or((least, None), |(squares, bin)| (squares, Some(bin)));
-            let size_nm = (plain - least).max(0.0).sqrt();
-            let kind = if step.is_some() { EventKind::OffsetChange } else { kind };
-            found.push(Trend { joint, kind, size_nm, left_nm: least.max(0.0).sqrt(), step });
+            continue;
         }
+        let step = if kind == EventKind::Drift { best_step(rows, joint, &scan.kept) } else { None };
+        let step = step.filter(|(squares, _)| *squares < MAX_STEP_RATIO * least);
+        let (least, step) = step.map_or((least, None), |(squares, bin)| (squares, Some(bin)));
+        let of_step = |bin: usize, values: &mut Vec<f64>| values.push(after(step.unwrap_or(bins), bin));
+        let of_kind: &Further<'_> = match (step, kind) {
+            (Some(_), _) => &of_step,
+            (None, EventKind::WarmUp) => &warm_up,
+            _ => &drift,
+        };
+        let [plain_error, error] =
+            [&none as &Further<'_>, of_kind].map(|of| prediction_error(&weighted, joint, &scan.kept, of));
+        if plain_error.zip(error).is_none_or(|(plain, error)| error > (1.0 - settings.min_trend_share) * plain) {
+            continue;
+        }
+        let size_nm = (plain - least).max(0.0).sqrt();
+        let kind = if step.is_some() { EventKind::OffsetChange } else { kind };
+        found.push(Trend { joint, kind, size_nm, left_nm: least.max(0.0).sqrt(), step });
     }
     found
 }

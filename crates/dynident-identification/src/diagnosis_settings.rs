@@ -266,6 +266,9 @@ pub struct ChannelSettings {
     /// Unexplained share with one robot for all joints above which a torque is independent of the motion. Default 1:
     /// the prediction from the other joints is then no better than zero torque.
     pub min_independent: f64,
+    /// Residual of the bodies of the description without friction, relative to the torque, up to which the torque of
+    /// every joint was computed from the description; 0.02. Dry friction of real drives is at least several percent.
+    pub max_residual_of_description: f64,
 }
 
 impl Default for ChannelSettings {
@@ -278,6 +281,7 @@ impl Default for ChannelSettings {
             min_doubted_unexplained: 0.03,
             min_independent_alone: 0.75,
             min_independent: 1.0,
+            max_residual_of_description: 0.02,
         }
     }
 }
@@ -299,8 +303,15 @@ pub struct HeldOutSettings {
     /// Largest ratio of the residual with a payload to the residual without it, for the payload to be reported. Default
     /// 0.6.
     pub max_ratio_with_payload: f64,
-    /// Smallest estimated mass of a payload, divided by its standard deviation, for the payload to be reported. Default
-    /// 5.
+    /// Largest ratio of the residual of a joint with the correction of its mistake to that without, for a log whose
+    /// other joints have a larger residual than in the training logs; 0.25.
+    pub max_ratio_of_corrected_joint: f64,
+    /// Largest root mean square distance of an instant from the training motion, relative to the ranges of positions
+    /// and velocities, for the instant to repeat it; 0.03.
+    pub max_distance_of_repeat: f64,
+    /// Share of such instants from which a held-out log repeats the training motion; 0.9.
+    pub min_share_of_repeat: f64,
+    /// Smallest estimated mass of a payload, in its standard deviations, for the payload to be reported; 5.
     pub min_payload_deviations: f64,
 }
 
@@ -312,6 +323,9 @@ impl Default for HeldOutSettings {
             min_torque_gain: 1.15,
             max_ratio_of_one_robot: 1.3,
             max_ratio_with_payload: 0.6,
+            max_ratio_of_corrected_joint: 0.25,
+            max_distance_of_repeat: 0.03,
+            min_share_of_repeat: 0.9,
             min_payload_deviations: 5.0,
         }
     }
@@ -375,11 +389,15 @@ impl DiagnosisSettings {
             ("channels.min_doubted_unexplained", channels.min_doubted_unexplained),
             ("channels.min_independent_alone", channels.min_independent_alone),
             ("channels.min_independent", channels.min_independent),
+            ("channels.max_residual_of_description", channels.max_residual_of_description),
             ("held_out.min_unexplained_ratio", held_out.min_unexplained_ratio),
             ("held_out.min_gain_of_number", held_out.min_gain_of_number),
             ("held_out.min_torque_gain", held_out.min_torque_gain),
             ("held_out.max_ratio_of_one_robot", held_out.max_ratio_of_one_robot),
             ("held_out.max_ratio_with_payload", held_out.max_ratio_with_payload),
+            ("held_out.max_ratio_of_corrected_joint", held_out.max_ratio_of_corrected_joint),
+            ("held_out.max_distance_of_repeat", held_out.max_distance_of_repeat),
+            ("held_out.min_share_of_repeat", held_out.min_share_of_repeat),
             ("held_out.min_payload_deviations", held_out.min_payload_deviations),
         ])
     }

@@ -61,7 +61,7 @@ pub struct CheckFinding {
     /// Severity.
     pub level: Level,
     /// Kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`, `description`,
-    /// `torque`, `limits`, `samples`, `rows`, `command` or `log`.
+    /// `torque`, `limits`, `samples`, `rows`, `motion`, `command` or `log`.
     pub kind: String,
     /// Description, with the names of joints.
     pub what: String,

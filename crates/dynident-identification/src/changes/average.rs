@@ -90,10 +90,10 @@ impl Differences {
     /// Mean and covariance of the difference of all bodies from the description if an explanation is true.
     fn posterior(&self, explanation: &Explanation) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut prior = self.spreads[explanation.covariance].clone();
-        for &group in &explanation.groups {
+        for (&group, scale) in explanation.groups.iter().zip(&explanation.scales) {
             let Part::Body(body) = self.parts[group] else { continue };
             let (first, unknowns) = (10 * body, &self.unknowns[group]);
-            let own = unknowns * unknowns.transpose() * explanation.scale.powi(2);
+            let own = unknowns * unknowns.transpose() * scale.powi(2);
             let mut block = prior.view_mut((first, first), (10, 10));
             block += own;
         }

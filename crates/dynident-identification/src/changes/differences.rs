@@ -20,9 +20,17 @@ const OTHER_ROBOT_PROBABILITY: f64 = 0.05;
 /// Expected value of the common factor of a changed body, minus 1.
 const EXPECTED_FACTOR: f64 = 0.5;
 
-/// Prior probability of a change of terms, and of each of the two ways in which a body changes: a load, or a common
-/// factor of all its values.
+/// Expected common factor with a load, relative to that without: most of a load near the centre of mass of its body is
+/// a factor, and the rest is small.
+const FACTOR_WITH_LOAD: f64 = 5.0;
+
+/// Prior probability of a change of terms, and of each of the three ways in which a body changes: a load, a common
+/// factor of all its values, or both.
 const CHANGE_PROBABILITY: f64 = 0.025;
+
+/// Factors of the error bars of a difference from a description, with the same probability: error bars for correlated
+/// residuals can be twice too wide.
+const ERROR_FACTORS: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Expected difference of a friction or drive parameter relative to its value. It is large because robot descriptions
 /// do not contain the friction of the real drive.

@@ -25,10 +25,12 @@ impl Differences {
     fn positive_factor(&self, explanation: &Explanation, nominal: &[f64]) -> f64 {
         let of_body = |body: usize| {
             let (change, covariance) = self.change_of(explanation, body);
-            let groups = explanation.groups.iter().filter(|&&group| self.parts[group] == Part::Body(body));
-            let expected: f64 = groups.map(|&group| self.unknowns[group].row(0).norm_squared()).sum();
+            let groups = explanation.groups.iter().zip(&explanation.scales);
+            let groups = groups.filter(|(group, _)| self.parts[**group] == Part::Body(body));
+            let expected: f64 =
+                groups.map(|(&group, scale)| (self.unknowns[group].row(0) * *scale).norm_squared()).sum();
             let mass = nominal[10 * body].max(0.0);
-            let before = positive(mass, explanation.scale.powi(2) * expected);
+            let before = positive(mass, expected);
             positive(mass + change[0], covariance[(0, 0)]) / before
         };
         self.bodies_of(explanation).into_iter().map(of_body).product()

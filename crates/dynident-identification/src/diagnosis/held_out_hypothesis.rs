@@ -85,13 +85,29 @@ impl Candidate {
         self.residual.score + self.rarity
     }
 
-    /// Whether the residual is clearly smaller than with the log `as_written`. In addition, the correction must close
-    /// half of the gap to the training logs or explain every joint; otherwise another cause is more probable.
+    /// Whether it is clearly better than the log `as_written`, and closes half of the gap to the training logs,
+    /// explains every joint, or explains its own joints. Otherwise another cause is likelier.
     fn is_clear(&self, as_written: &Residual, settings: &DiagnosisSettings) -> bool {
         let trained: f64 = as_written.trained.iter().map(|left| left.ln()).sum();
-        (self.score() < 0.5 * (as_written.score + trained) || self.residual.is_explained(settings))
+        (self.score() < 0.5 * (as_written.score + trained)
+            || self.residual.is_explained(settings)
+            || self.explains_its_joints(as_written, settings))
             && self.score() <= as_written.score - settings.score.min_gain
             && self.residual.rms < as_written.rms
+    }
+
+    /// Whether the residual of each joint that the mistake concerns becomes much smaller, and no residual of another
+    /// joint larger. With other motion than in the training logs, all joints can have a larger residual without a
+    /// mistake.
+    fn explains_its_joints(&self, as_written: &Residual, settings: &DiagnosisSettings) -> bool {
+        let (before, after) = (&as_written.left, &self.residual.left);
+        let joints = self.mistake.joints(before.len());
+        let max_ratio = settings.held_out.max_ratio_of_corrected_joint;
+        let is_right = |joint: usize| {
+            let limit = if joints.contains(&joint) { max_ratio } else { 1.0 + MIN_RESIDUAL_SHARE };
+            after[joint] <= limit * before[joint]
+        };
+        joints.len() < before.len() && (0..before.len()).all(is_right)
     }
 }
 

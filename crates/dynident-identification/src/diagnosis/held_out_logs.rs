@@ -6,6 +6,7 @@ use super::held_out_hypothesis::{HeldOutHypothesis, KnownRobot, held_out_hypothe
 use super::hypothesis::Hypothesis;
 use super::lag_search::LagSearch;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
+use super::repeated_motion::repeats_motion;
 use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
 use crate::diagnosis_settings::DiagnosisSettings;
@@ -15,6 +16,7 @@ use dynident_rows::{Logs, RegressorModel, Role};
 pub(super) struct HeldOutLogs {
     pub(super) payloads: Vec<UnmodelledPayload>,
     pub(super) hypotheses: Vec<HeldOutHypothesis>,
+    pub(super) repeated_motions: Vec<usize>,
 }
 
 pub(super) struct TrainingResult<'a> {
@@ -39,6 +41,9 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Re
     for log in logs.of_role(Role::Validate) {
         let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
         let rows = samples[0].instants(INSTANTS);
+        if repeats_motion(trained.rows, &rows, &settings.held_out) {
+            found.repeated_motions.push(log);
+        }
         let lag_search = LagSearch::new(robot, &samples, trained.compensated_s.to_vec(), settings);
         let (mut payload, mut hypothesis) = (None, None);
         for theta in trained.theta.into_iter().chain([&trained.as_written.parameters[..]]) {

@@ -17,7 +17,7 @@
 //! | `lag_search` | channels that were logged too late or too early |
 //! | `training` | the search in the training logs |
 //! | `description_fit`, `wrong_mass` | units of torque, another robot, one wrong mass |
-//! | `held_out_logs`, `held_out_hypothesis`, `unmodelled_payload` | payloads and mistakes of one held-out log |
+//! | `held_out_logs`, `held_out_hypothesis`, `unmodelled_payload`, `repeated_motion` | payloads, mistakes and motion of one held-out log |
 //! | `duplicate_channels`, `inconsistent_torque` | columns that no correction repairs |
 
 mod channels;
@@ -40,6 +40,7 @@ mod noise_torque;
 mod nominal;
 mod plausibility;
 mod refinement;
+mod repeated_motion;
 mod round;
 mod search;
 mod span;
@@ -78,6 +79,7 @@ use explanation::Explanation;
 use held_out_logs::{HeldOutLogs, TrainingResult, held_out_logs};
 use inconsistent_torque::inconsistent_torques;
 use noise_torque::torque_of_noise;
+use nominal::is_torque_of_description;
 use span::dot;
 use training::{SearchedLogs, searched_logs};
 
@@ -92,11 +94,15 @@ pub struct Diagnosis {
     pub unmodelled_payloads: Vec<UnmodelledPayload>,
     /// Mistakes of single held-out logs.
     pub held_out: Vec<HeldOutHypothesis>,
-    /// Columns that are used for two joints. If there are any, no hypothesis is reliable.
+    /// Numbers of the held-out logs that repeat the motion of the training logs.
+    pub repeated_motions: Vec<usize>,
+    /// Columns that are used for two joints; then no hypothesis is reliable.
     pub duplicate_channels: Vec<DuplicateChannel>,
     /// Whether the torques are magnitudes without signs.
     pub lost_signs: bool,
-    /// Joint torques that no robot model explains together with the other torques, for the best hypothesis.
+    /// Whether the nominal bodies explain the torque of every joint without friction: a model computed it.
+    pub is_torque_of_description: bool,
+    /// Torques that are inconsistent with the others under the best hypothesis.
     pub inconsistent_torques: Vec<InconsistentTorque>,
     /// Share of each joint's torque that noise explains, 0 to 1 (root mean squares). Included are white noise of the
     /// torque and, if the best hypothesis leaves most of the torque unexplained, noise of the positions.
@@ -160,7 +166,7 @@ fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisErr
     let description_fit = description_fit(&best.robot, &best.rows, &search.believed().left, settings.description);
     let as_written = &search.as_written;
     let is_explained = search.best.is_none() && as_written.left_of_all < settings.score.max_unexplained;
-    let HeldOutLogs { payloads, hypotheses } = match theta.filter(|_| is_explained) {
+    let HeldOutLogs { payloads, hypotheses, repeated_motions } = match theta.filter(|_| is_explained) {
         Some(theta) => {
             let theta = (robot.terms() == task.robot.terms()).then_some(theta);
             let (consistency, compensated_s) = (&consistency, &compensated_s[..]);
@@ -200,8 +206,10 @@ fn diagnose_at_cutoff(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisErr
         description_fit,
         unmodelled_payloads: payloads,
         held_out: hypotheses,
+        repeated_motions,
         duplicate_channels,
         lost_signs,
+        is_torque_of_description: is_torque_of_description(&study.robot, &study.rows, settings.channels),
         inconsistent_torques,
         noise: noise_shares,
         noise_of_all,

@@ -2,6 +2,7 @@
 
 use super::motion_rows::MotionRows;
 use super::span::{dot, root_mean_square};
+use crate::diagnosis_settings::ChannelSettings;
 use crate::friction::step_of_joint;
 use dynident_dynamics::{Panels, ParametricModel, Workspace, inverse_dynamics};
 use dynident_model::terms::CoulombShape;
@@ -56,8 +57,17 @@ fn torque_of(
     torque
 }
 
-/// Root mean square residual of each joint, Nm (N), with the torque `nominal` of the nominal bodies
-/// ([`nominal_torque`]), the best nonnegative viscous and Coulomb friction, and the best offset.
+/// Whether the nominal bodies alone explain the torque of every joint. Measured torque contains friction.
+pub(super) fn is_torque_of_description(robot: &ParametricModel, rows: &MotionRows, settings: ChannelSettings) -> bool {
+    let is_nominal = |(tau, nominal): (&Vec<f64>, &Vec<f64>)| {
+        let rest: Vec<f64> = tau.iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
+        root_mean_square(&rest) <= settings.max_residual_of_description * root_mean_square(tau)
+    };
+    nominal_torque(robot, rows).is_some_and(|nominal| rows.tau.iter().zip(&nominal).all(is_nominal))
+}
+
+/// Residual of each joint by the torque `nominal` of the nominal bodies ([`nominal_torque`]) with the best nonnegative
+/// viscous and Coulomb friction and the best offset, root mean square, Nm (N).
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();

@@ -178,6 +178,16 @@ fn honest_logs_have_no_event() {
 }
 
 #[test]
+fn friction_that_holds_a_joint_at_rest_is_no_event() {
+    for seed in 0..8 {
+        let model = robot(["ur10", "iiwa14", "panda_arm7", "tx40"][seed as usize % 4]);
+        let log = Truth::new(&model, 80 + seed).log(Scene::Normal(Style::RepeatedProgram), 90 + seed);
+        let events = found_events(&model, &[&log]);
+        assert!(events.is_empty(), "seed {seed}: {events:#?}");
+    }
+}
+
+#[test]
 fn another_payload_in_another_log_is_no_event() {
     let model = robot("ur10");
     let truth = Truth::new(&model, 70);

@@ -88,10 +88,12 @@ pub enum Style {
     FrictionWithMemory,
     /// Pick and place with rests in which any share of the dry friction holds a joint.
     Stiction,
+    /// Pick and place between the same four points. A joint at rest keeps the dry friction of its last motion.
+    RepeatedProgram,
 }
 
 /// All styles.
-pub const STYLES: [Style; 12] = [
+pub const STYLES: [Style; 13] = [
     Style::Excitation,
     Style::FastReversals,
     Style::Rests,
@@ -104,6 +106,7 @@ pub const STYLES: [Style; 12] = [
     Style::SharpStribeck,
     Style::FrictionWithMemory,
     Style::Stiction,
+    Style::RepeatedProgram,
 ];
 
 /// A simulated log.
@@ -269,14 +272,15 @@ impl Truth {
             let stribeck = if scene == Scene::Normal(Style::SharpStribeck) { 1.0 } else { stribeck };
             let load = if scene == Scene::Normal(Style::LoadFriction) { 0.15 } else { 0.01 };
             let velocity = differences(&path[joint]);
-            let (mut bristle, mut held) = (Bristle::default(), Held::default());
+            let reach_rad = if scene == Scene::Normal(Style::RepeatedProgram) { 3e-4 } else { 0.02 };
+            let (mut bristle, mut held) = (Bristle { reach_rad, direction: 0.0 }, Held::default());
             for (k, dq) in velocity.iter().enumerate() {
                 let cold =
                     if scene == Scene::WarmUp && has_event { 1.0 + (-(k as f64) / RATE_HZ / 8.0).exp() } else { 1.0 };
                 let dry = dry * (1.0 + stribeck * (-(dq / 0.08).powi(2)).exp()) + load * tau[joint][k].abs();
                 let ripple = 0.05 * ripple * self.scale[joint] * (40.0 * path[joint][k]).sin();
                 let direction = match scene {
-                    Scene::Normal(Style::FrictionWithMemory) => bristle.next(*dq),
+                    Scene::Normal(Style::FrictionWithMemory | Style::RepeatedProgram) => bristle.next(*dq),
                     Scene::Normal(Style::Stiction) => held.next(*dq, random),
                     _ => (dq / 0.008).tanh(),
                 };
@@ -287,16 +291,17 @@ impl Truth {
 }
 
 /// Friction relative to its dry value with the memory of an elastic contact (Dahl).
-#[derive(Default)]
-struct Bristle(f64);
+struct Bristle {
+    /// Distance after a reversal that reverses the friction.
+    reach_rad: f64,
+    direction: f64,
+}
 
 impl Bristle {
-    const REACH_RAD: f64 = 0.02;
-
     fn next(&mut self, dq: f64) -> f64 {
-        self.0 += dq / RATE_HZ / Self::REACH_RAD * 3.0 * (1.0 - self.0 * dq.signum());
-        self.0 = self.0.clamp(-1.0, 1.0);
-        self.0
+        self.direction += dq / RATE_HZ / self.reach_rad * 3.0 * (1.0 - self.direction * dq.signum());
+        self.direction = self.direction.clamp(-1.0, 1.0);
+        self.direction
     }
 }
 

@@ -12,9 +12,10 @@ const BRAKE_S: f64 = 0.25;
 /// The motion of a style.
 pub(super) fn path(truth: &Truth, style: Style, random: &mut Random) -> Path {
     match style {
-        Style::PickAndPlace | Style::Stiction => pick_and_place(truth, 1.0, random),
+        Style::PickAndPlace | Style::Stiction => pick_and_place(truth, 1.0, usize::MAX, random),
+        Style::RepeatedProgram => pick_and_place(truth, 0.7, 4, random),
         Style::FastReversals => excitation(truth, 2.5, random),
-        Style::FastMotion => pick_and_place(truth, 2.0, random),
+        Style::FastMotion => pick_and_place(truth, 2.0, usize::MAX, random),
         Style::Rests => {
             let path = excitation(truth, 1.0, random);
             let path = halted(&path, 5.0, 8.0);
@@ -65,16 +66,22 @@ pub(super) fn excitation(truth: &Truth, speed: f64, random: &mut Random) -> Path
     truth.home.iter().zip(&truth.reach).map(one).collect()
 }
 
-/// Point-to-point motion with rests of different length.
-pub(super) fn pick_and_place(truth: &Truth, speed: f64, random: &mut Random) -> Path {
+/// Point-to-point motion with rests of different length, between the same `points` in turn.
+pub(super) fn pick_and_place(truth: &Truth, speed: f64, points: usize, random: &mut Random) -> Path {
     let samples = (DURATION_S * RATE_HZ) as usize;
     let dof = truth.home.len();
     let mut path = vec![Vec::with_capacity(samples); dof];
     let mut from = truth.home.clone();
+    let mut program: Vec<(Vec<f64>, f64)> = Vec::new();
+    let mut stroke = 0;
     while path[0].len() < samples {
-        let to: Vec<f64> =
-            truth.home.iter().zip(&truth.reach).map(|(home, reach)| home + reach * random.uniform(-1.0, 1.0)).collect();
-        let moving_s = random.uniform(0.8, 1.6) / speed;
+        if program.len() < points {
+            let of_joint = |(home, reach): (&f64, &f64)| home + reach * random.uniform(-1.0, 1.0);
+            let to = truth.home.iter().zip(&truth.reach).map(of_joint).collect();
+            program.push((to, random.uniform(0.8, 1.6) / speed));
+        }
+        let (to, moving_s) = program[stroke % points].clone();
+        stroke += 1;
         let rest_s = random.uniform(0.05, 0.7);
         for k in 0..((moving_s + rest_s) * RATE_HZ) as usize {
             let u = (k as f64 / RATE_HZ / moving_s).min(1.0);

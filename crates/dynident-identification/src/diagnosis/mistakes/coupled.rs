@@ -1,11 +1,10 @@
 //! Mistake: a column that also moves with a neighbouring joint.
 
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
-use super::study_keys::{KeyChange, StudyKeys, list};
+use super::study_keys::{KeyChange, StudyKeys};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
-use dynident_recording::log::ChannelGroup;
 
 /// The position column of a joint also moves with another joint: it contains `q_joint + sign q_with`, as at the motor
 /// of a parallelogram or of a coupled wrist. If torques are measured at the motors, the column of `τ_with` lacks
@@ -74,17 +73,11 @@ impl MistakeKind for Coupled {
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
         let [joint, with] = [self.joint, self.with].map(|joint| keys.places[joint]);
         let of = |channels: Channels| {
-            let (group, table) = keys.group(channels);
-            let has = |matrix: fn(&ChannelGroup) -> bool| group.is_some_and(matrix);
-            if has(|group| group.matrix.is_some() || group.inverse_matrix.is_some() || group.sum.is_some()) {
-                let line = format!("# matrix: rows {} and {} are coupled", joint + 1, with + 1);
-                return KeyChange { table, line };
-            }
             let (place, value) =
                 if channels == Channels::Torque { ([with, joint], self.sign) } else { ([joint, with], -self.sign) };
-            let entry = |at: [usize; 2]| if at == place { value } else { f64::from(u8::from(at[0] == at[1])) };
-            let row = |row: usize| list((0..keys.columns).map(|column| format!("{:?}", entry([row, column]))));
-            keys.per_column(channels, "matrix", row)
+            keys.matrix(channels, [joint, with], &|row, column| {
+                if [row, column] == place { value } else { f64::from(u8::from(row == column)) }
+            })
         };
         self.channels.each().map(of).collect()
     }

@@ -5,6 +5,7 @@
 pub mod compensated;
 pub mod convention;
 pub mod coupled;
+pub mod differential;
 pub mod gravity;
 mod kind;
 pub mod lag;
@@ -66,6 +67,7 @@ mistake_kinds! {
     order::Order,
     offset::Offset,
     coupled::Coupled,
+    differential::Differential,
     gravity::Gravity,
     convention::Convention,
     length::Length,

@@ -62,7 +62,24 @@ impl StudyKeys {
         KeyChange { table, line: format!("{key} = {}", list((0..self.columns).map(value))) }
     }
 
-    /// A change of `scale`: the values of `joints` are multiplied by `factor`.
+    /// `matrix` of positions or torques with these values by row (joint) and column of the log. If the study has a
+    /// matrix, a comment names the coupled `rows`.
+    pub(super) fn matrix(
+        &self,
+        channels: Channels,
+        rows: [usize; 2],
+        value: &dyn Fn(usize, usize) -> f64,
+    ) -> KeyChange {
+        let (group, table) = self.group(channels);
+        if group.is_some_and(|group| group.matrix.is_some() || group.inverse_matrix.is_some() || group.sum.is_some()) {
+            let line = format!("# matrix: rows {} and {} are coupled", rows[0] + 1, rows[1] + 1);
+            return KeyChange { table, line };
+        }
+        let row = |row: usize| list((0..self.columns).map(|column| format!("{:?}", value(row, column))));
+        self.per_column(channels, "matrix", row)
+    }
+
+    /// `scale` with the values of `joints` times `factor`.
     pub(super) fn scales(&self, channels: Channels, joints: &[usize], factor: f64) -> KeyChange {
         let (group, _) = self.group(channels);
         let places: Vec<usize> = joints.iter().map(|&joint| self.places[joint]).collect();

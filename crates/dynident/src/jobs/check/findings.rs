@@ -3,6 +3,9 @@
 use super::CheckSettings;
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::description::{another_robot, torque_unit, wrong_mass};
+use super::torques::{
+    are_most_joints_unexplained, mostly_unexplained, torque_of_description, unexplained, unrelated_torques,
+};
 use super::wording::{FindingContext, alternative, evidence, finding};
 use crate::result::{CheckFinding, HypothesisResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
@@ -53,6 +56,8 @@ pub(super) fn study_check(
     findings.extend(payloads.map(|payload| unmodelled_payload(study, robot, payload)));
     let held_out = diagnosis.held_out.iter().filter(|found| found.log < study.log.len());
     findings.extend(held_out.map(|found| of_held_out_log(study, robot, found, &joints)));
+    let repeated = diagnosis.repeated_motions.iter().filter(|log| **log < study.log.len());
+    let repeated: Vec<CheckFinding> = repeated.map(|log| repeated_motion(&study.log_name(*log))).collect();
     if findings.is_empty() {
         findings.extend(diagnosis.inconsistent_torques.iter().map(|torque| inconsistent_torque(torque, &joints)));
     }
@@ -64,9 +69,15 @@ pub(super) fn study_check(
     }
     let is_problem = |finding: &CheckFinding| finding.level == Level::Problem;
     let is_unexplained = diagnosis.unexplained_beyond_noise() > thresholds.max_unexplained_beyond_noise;
-    if is_unexplained && !findings.iter().any(is_problem) {
-        findings.push(mostly_unexplained(diagnosis, &joints));
+    let are_most_unexplained = are_most_joints_unexplained(diagnosis, thresholds);
+    if (is_unexplained || are_most_unexplained) && !findings.iter().any(is_problem) {
+        let level = if are_most_unexplained { Level::Problem } else { Level::Warning };
+        findings.push(CheckFinding { level, ..mostly_unexplained(diagnosis, &joints) });
     }
+    if diagnosis.is_torque_of_description {
+        findings.push(torque_of_description());
+    }
+    findings.extend(repeated);
     StudyCheck {
         findings,
         as_written: Some(hypothesis_result(&search.as_written, &joints)),
@@ -128,62 +139,16 @@ impl FindingContext<'_> {
     }
 }
 
-fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
-    let left = &search.as_written.left;
-    let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
-    finding(
-        "description",
-        "the robot description is of another robot, or the study has several mistakes".to_owned(),
-        format!(
-            "none of {} hypotheses (signs, orders, zeros, mounting) explains the logs with this robot: {} of the torque of `{}` is unexplained; \
-             check link lengths, axes and the kind of the robot",
-            search.tried,
-            percent(left[worst]),
-            joints[worst]
-        ),
-    )
-}
-
-/// Finding if most of the torque is unexplained although no tested mistake explains more of it.
-///
-/// It is only a warning, because friction and position noise of a correct log can cause it: `check` fits at a few
-/// hundred instants.
-fn mostly_unexplained(diagnosis: &Diagnosis, joints: &[String]) -> CheckFinding {
-    let search = &diagnosis.search;
-    let believed = search.believed();
-    let shares = believed.left.iter().zip(joints).map(|(left, joint)| format!("{joint} {}", percent(*left)));
+/// A held-out log whose error is that of the training motion.
+fn repeated_motion(log: &str) -> CheckFinding {
     let found = finding(
-        "torque",
-        "most of the torque is unexplained, and no tested mistake of the study explains it".to_owned(),
-        format!(
-            "with the best of {} hypotheses, {} of all torque is unexplained, of which noise explains {} ({}): plot torque against position. Check \
-                 that each row contains torque and position of the same instant (recorders with different rates), that the torque does not \
-                 overflow or saturate, and that `columns` and `file` under [robot] are those of this robot",
-            search.tried,
-            percent(believed.left_of_all),
-            percent(diagnosis.noise_of_all),
-            shares.collect::<Vec<_>>().join(", "),
-        ),
+        "motion",
+        format!("log `{log}` repeats the motion of the training logs"),
+        "its error does not show how well the model predicts other motions: use a log of another motion with \
+         role = \"validate\""
+            .to_owned(),
     );
     CheckFinding { level: Level::Warning, ..found }
-}
-
-/// A share as text in percent; above 1000 % the number itself is not meaningful.
-fn percent(share: f64) -> String {
-    if share > 10.0 { "more than 1000 %".to_owned() } else { format!("{:.0} %", 100.0 * share) }
-}
-
-fn unrelated_torques(search: &Search) -> CheckFinding {
-    finding(
-        "torque",
-        "the torques are unrelated to the motion".to_owned(),
-        format!(
-            "with the best of {} hypotheses, {:.0} % of all torque is unexplained: compare `columns` under torque and position with the log's \
-             header, check that both come from one run, and do not use commanded positions or positions that repeat for many rows",
-            search.tried,
-            100.0 * search.believed().left_of_all
-        ),
-    )
 }
 
 pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSettings) -> Option<CheckFinding> {

@@ -6,6 +6,7 @@ mod commands;
 mod description;
 mod findings;
 mod settings;
+mod torques;
 mod wording;
 
 pub use settings::CheckSettings;

@@ -19,8 +19,11 @@ pub struct CheckSettings {
     /// 0.6, like the limit of `identify`. The finding is a warning and not a PROBLEM, because a correct study with a
     /// noisy log of a slow pendulum has 0.80.
     pub max_unexplained_beyond_noise: f64,
-    /// Largest ratio between the torque factors of joints that a common unit or motor currents can explain. Default
-    /// 10: motor constants times gear ratios of one arm differ by a factor of at most 5.
+    /// The same share of the torque of one joint above which most of it is unexplained. Default 0.75. More than half of
+    /// the joints, and at least three, are a PROBLEM: noise and friction of honest logs spoil single weak joints.
+    pub max_unexplained_of_joint: f64,
+    /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
+    /// gear ratios of one arm differ by at most 5.
     pub max_factor_ratio: f64,
     /// Number of equations per parameter below which the logs are too short. Default 2.
     pub too_few_equations: usize,
@@ -38,6 +41,7 @@ impl Default for CheckSettings {
             max_unexplained_ratio: 0.75,
             min_unrelated_share: 0.92,
             max_unexplained_beyond_noise: 0.6,
+            max_unexplained_of_joint: 0.75,
             max_factor_ratio: 10.0,
             too_few_equations: 2,
             few_equations: 3,
@@ -56,6 +60,7 @@ impl CheckSettings {
         Expected::Range(0.0, 1.0).check("max_unexplained_ratio", self.max_unexplained_ratio)?;
         Expected::Range(0.0, 1.0).check("min_unrelated_share", self.min_unrelated_share)?;
         Expected::Range(0.0, 1.0).check("max_unexplained_beyond_noise", self.max_unexplained_beyond_noise)?;
+        Expected::Range(0.0, 1.0).check("max_unexplained_of_joint", self.max_unexplained_of_joint)?;
         Expected::Range(1.0, 1e6).check("max_factor_ratio", self.max_factor_ratio)?;
         let few = self.few_equations as f64;
         Expected::Range(0.0, few).check("too_few_equations", self.too_few_equations as f64)?;

@@ -79,6 +79,27 @@ fn columns_that_belong_together_are_named() {
             named: &["position and torque"],
         },
         Case {
+            name: "the motors of a differential wrist",
+            rows: |rows| {
+                each(rows, |row| {
+                    [row[5], row[6]] = [row[5] + row[6], row[5] - row[6]];
+                    [row[11], row[12]] = [row[11] + row[12], row[11] - row[12]].map(|sum| 0.5 * sum);
+                });
+            },
+            study: SAME,
+            kind: "coupling",
+            named: &[
+                "[0.0, 0.0, 0.0, 0.0, 0.5, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5, -0.5]]`; in [format.torque] write `matrix",
+            ],
+        },
+        Case {
+            name: "the positions of these motors with torques of the joints",
+            rows: |rows| each(rows, |row| [row[5], row[6]] = [row[5] + row[6], row[5] - row[6]]),
+            study: SAME,
+            kind: "coupling",
+            named: &["[0.0, 0.0, 0.0, 0.0, 0.5, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5, -0.5]]"],
+        },
+        Case {
             name: "one torque for two joints",
             rows: |rows| each(rows, |row| row[9] = row[8]),
             study: SAME,

@@ -1,7 +1,7 @@
 //! Mistakes in the held-out log only.
 
-use super::{Case, JOINTS, SAME, checked_in, each, problems};
-use crate::common::{Job, repository};
+use super::{Case, JOINTS, SAME, check_text, checked_in, each, problems, study_of, write_noisy};
+use crate::common::{Job, Motion, Truth, header, repository, write_log};
 
 #[test]
 fn mistakes_of_the_held_out_log_are_named_as_its_own() {
@@ -54,6 +54,58 @@ fn mistakes_of_the_held_out_log_are_named_as_its_own() {
         }
     }
     assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// Friction of another day explains no reversed sign, and is no mistake.
+#[test]
+fn a_reversed_torque_is_named_despite_other_friction() {
+    let description = repository("robots/ur10.urdf");
+    for sign in [1.0, -1.0] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut truth = Truth::near(&description, 0.1, false);
+        write_noisy(&folder.path().join("train.csv"), &truth, 1);
+        for [_, viscous, coulomb, _] in &mut truth.drive {
+            (*viscous, *coulomb) = (1.4 * *viscous, 1.4 * *coulomb);
+        }
+        write_log(
+            &folder.path().join("test.csv"),
+            &truth,
+            &Motion::new(6, 102),
+            (200.0, 20.0),
+            &header(6),
+            |q, tau| {
+                let mut tau = tau.to_vec();
+                tau[2] *= sign;
+                [q, &tau[..]].concat()
+            },
+        );
+        let found = problems(&check_text(folder.path(), &study_of(&description, 6, &["train.csv", "test.csv"])));
+        let is_named = found.iter().any(|(kind, text)| kind == "sign" && text.contains(JOINTS[2]));
+        assert_eq!(is_named, sign < 0.0, "{found:?}");
+    }
+}
+
+/// The torque of a model as effort.
+#[test]
+fn torques_of_the_description_are_named() {
+    let description = repository("robots/ur10.urdf");
+    let is_named = |friction: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut truth = Truth::near(&description, 0.0, false);
+        truth.drive.iter_mut().for_each(|drive| *drive = drive.map(|value| friction * value));
+        write_noisy(&folder.path().join("test.csv"), &truth, 2);
+        write_log(
+            &folder.path().join("train.csv"),
+            &truth,
+            &Motion::new(6, 101),
+            (200.0, 20.0),
+            &header(6),
+            |q, tau| [q, tau].concat(),
+        );
+        let check = check_text(folder.path(), &study_of(&description, 6, &["train.csv", "test.csv"]));
+        check.findings.iter().any(|finding| finding.what.starts_with("the torques are those of the robot description"))
+    };
+    assert_eq!([0.0, 1.0].map(is_named), [true, false]);
 }
 
 /// Exchanged torques of two runs with equal length: no hypothesis explains them.

@@ -219,3 +219,21 @@ fn a_torque_that_drops_out_for_a_while_costs_nothing() {
     // A tenth of one joint's rows is missing; the limit is 1.15.
     assert!(spoilt < 1.15 * as_it_is, "{as_it_is} and {spoilt}");
 }
+
+/// The torque columns contain every second sample of the first half: no column explains them, and no joint fits.
+#[test]
+fn torques_of_half_the_rate_are_a_problem() {
+    all_are_named(&[Case {
+        name: "torques of half the rate",
+        rows: |rows| {
+            let source = rows.clone();
+            rows.truncate(source.len() / 2);
+            for (k, row) in rows.iter_mut().enumerate() {
+                row[7..].copy_from_slice(&source[2 * k][7..]);
+            }
+        },
+        study: SAME,
+        kind: "torque",
+        named: &["recorders with different rates"],
+    }]);
+}
