@@ -235,7 +235,7 @@ struct Whitened<'a> {
 impl Whitened<'_> {
     /// A pair with the mean evidence of all ratios of its scales, and the explanation at the best ratio.
     fn at_all_ratios(&self, equal: &(f64, Explanation), prior: f64) -> (f64, Explanation) {
-        let other = |ratio: &f64| self.explained(&equal.1.groups, &[ratio.sqrt(), ratio.sqrt().recip()], prior);
+        let other = |ratio: &f64| self.explained(&equal.1.groups, &[1.0, *ratio], prior);
         let mut all: Vec<(f64, Explanation)> = PAIR_RATIOS[1..].iter().map(other).collect();
         all.push(equal.clone());
         let log = mean_of_logarithms(all.iter().map(|(log, _)| *log));

@@ -87,7 +87,8 @@ impl Differences {
         let inertial = robot.model().inertial_count();
         let absolute = absolute_values(values, covariance);
         let all = effects(base).select_rows(rows);
-        let mut covariance = covariance.clone();
+        let bars = covariance;
+        let mut covariance = bars.clone();
         for column in inertial..inertial + robot.terms().len() {
             let place = rows.iter().position(|&row| base.independent()[row] == column);
             let effect = all.column(column) * (UNKNOWN_TERM_RATIO * place.map_or(1.0, |k| absolute[k]));
@@ -107,7 +108,9 @@ impl Differences {
             spreads: covariances_of(&spread, robot, &sizes),
             sizes,
         };
-        found.explain(&groups, CHANGE_PROBABILITY)?;
+        // Only the error bars have a factor: friction is unknown, and differences of bodies have their own sizes.
+        let settings = ChangeSettings { error_factors: vec![1.0], ..settings() };
+        found.explain(&groups, bars, &ERROR_FACTORS, &settings)?;
         let probability = |own: &Spread| {
             let of_all = if own.is_small() { SMALL_PROBABILITY } else { 1.0 - SMALL_PROBABILITY };
             of_all * own.share()
@@ -150,7 +153,7 @@ impl Differences {
             sizes,
             spreads,
         };
-        found.explain(&groups, CHANGE_PROBABILITY)?;
+        found.explain(&groups, &DMatrix::zeros(rows.len(), rows.len()), &[1.0], &settings())?;
         let probability = |own: &Spread| {
             if own.largest() > 0.0 {
                 OTHER_ROBOT_PROBABILITY * own.share()
@@ -162,12 +165,23 @@ impl Differences {
         Ok(found)
     }
 
-    /// Finds the explanations by `groups`, each of which changed with this prior probability.
-    fn explain(&mut self, groups: &[ChangeGroup], probability: f64) -> Result<(), EstimationError> {
+    /// Finds the explanations by `groups`. The part `bars` of the covariance is multiplied by the square of each of
+    /// these factors.
+    fn explain(
+        &mut self,
+        groups: &[ChangeGroup],
+        bars: &DMatrix<f64>,
+        factors: &[f64],
+        settings: &ChangeSettings,
+    ) -> Result<(), EstimationError> {
         let with = |own: &DMatrix<f64>| &self.covariance + &self.effects * own * self.effects.transpose();
-        let covariances: Vec<_> = self.spreads.iter().map(with).collect();
-        let settings = ChangeSettings { together: false, probability, ..ChangeSettings::default() };
-        self.explanations = explanations(&self.difference, &covariances, groups, &settings)?;
+        let scaled = |own: DMatrix<f64>| factors.iter().map(move |factor| &own + bars * (factor * factor - 1.0));
+        let covariances: Vec<_> = self.spreads.iter().map(with).flat_map(scaled).collect();
+        self.explanations = explanations(&self.difference, &covariances, groups, settings)?;
+        for own in &mut self.explanations {
+            own.error_factor *= factors[own.covariance % factors.len()];
+            own.covariance /= factors.len();
+        }
         Ok(())
     }
 
@@ -288,8 +302,8 @@ impl Differences {
     }
 }
 
-/// Groups of unknowns for the parts that are `tested`. A body has two groups: a change of its ten values, as by a load,
-/// and a common factor of all its values. The group of another part contains its terms. Returns the part of each group,
+/// Groups of unknowns for the parts that are `tested`. A body has three groups: a change of its ten values, as by a
+/// load, a common factor of all its values, and both together. The group of another part contains its terms. Returns the part of each group,
 /// the change of the values per unknown, and the effect on the base parameters.
 fn groups(
     robot: &ParametricModel,
@@ -302,19 +316,28 @@ fn groups(
         if !tested(&part) {
             continue;
         }
+        let own = DMatrix::from_diagonal(&sizes);
         if let Some(body) = part.body() {
-            let nominal = nominal_values(robot, body) * EXPECTED_FACTOR;
-            let factor = DMatrix::from_column_slice(10, 1, nominal.as_slice());
-            let effect = effects.columns(10 * body, 10) * &factor;
-            parts.push(part.clone());
-            groups.push(ChangeGroup { name: group.name.clone(), effect });
-            unknowns.push(factor);
+            let factor = nominal_values(robot, body) * EXPECTED_FACTOR;
+            let mut both = own.clone().insert_column(sizes.len(), 0.0);
+            both.set_column(sizes.len(), &(&factor * FACTOR_WITH_LOAD));
+            for unknown in [DMatrix::from_column_slice(factor.len(), 1, factor.as_slice()), both] {
+                parts.push(part.clone());
+                let effect = effects.columns(10 * body, 10) * &unknown;
+                groups.push(ChangeGroup { name: group.name.clone(), effect });
+                unknowns.push(unknown);
+            }
         }
         parts.push(part);
         groups.push(group);
-        unknowns.push(DMatrix::from_diagonal(&sizes));
+        unknowns.push(own);
     }
     (parts, unknowns, groups)
+}
+
+/// Settings without a change of all groups together, which the differences of all bodies replace.
+fn settings() -> ChangeSettings {
+    ChangeSettings { together: false, probability: CHANGE_PROBABILITY, ..ChangeSettings::default() }
 }
 
 /// Absolute values with their standard deviations.

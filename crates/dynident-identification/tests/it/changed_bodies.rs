@@ -2,7 +2,7 @@
 
 use dynident_dynamics::ParametricModel;
 use dynident_identification::DescriptionThresholds;
-use dynident_identification::changes::DescriptionDifferences;
+use dynident_identification::changes::Differences;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Mat3, Vec3};
@@ -27,7 +27,7 @@ fn named_bodies(change: impl Fn(usize, &InertialParameters) -> InertialParameter
     let values = DVector::from_fn(rows.len(), |row, _| truth[row] + ERROR_SHARE * std(row) * random.normal());
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| if a == b { std(a).powi(2) } else { 0.0 });
     let knowledge = ConsistencySettings::default();
-    let found = DescriptionDifferences::new(&robot, &rows, &values, &covariance, &knowledge).unwrap().unwrap();
+    let found = Differences::from_description(&robot, &rows, &values, &covariance, &knowledge).unwrap().unwrap();
     found.followed(&DescriptionThresholds::default()).map_or_else(Vec::new, |own| found.bodies_of(own))
 }
 
