@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The scales `s` of the changes and `c` of the error bars are not known; the evidence is the mean over the values in
-//! [`ChangeSettings`]. The scales of two groups have the ratios in [`PAIR_RATIOS`]: a large tool at the flange may
+//! [`ChangeSettings`]. The scales of two groups have the ratios [`ChangeSettings::pair_ratios`]: a large tool at the flange may
 //! occur together with a small change of a heavy link. The odds of two explanations are the ratios of evidence times
 //! prior probability.
 //!
@@ -27,9 +27,6 @@ const ROUNDING: f64 = 1e-9;
 
 /// Eigenvalue of `BᵀB` relative to the largest one, below which its direction has no effect: the square of rounding.
 const MIN_EIGENVALUE: f64 = 1e-13;
-
-/// Ratios of the scales of two groups that changed together.
-const PAIR_RATIOS: [f64; 3] = [1.0, 1.0 / 3.0, 3.0];
 
 /// Number of pairs with the best evidence at equal scales that are compared at all ratios.
 const REFINED_PAIRS: usize = 16;
@@ -52,6 +49,9 @@ pub struct ChangeSettings {
     /// Factors of the error bars, each with the same probability. Default 1, 1.5, 2: on average the error bars are
     /// right, but some logs have errors that the error bars do not include.
     pub error_factors: Vec<f64>,
+    /// Ratios of the scales of two groups that changed together, each with the same probability. Default 1: the same
+    /// scale for both.
+    pub pair_ratios: Vec<f64>,
     /// Prior probability that a group changed. Default 0.05, a change is rare.
     pub probability: f64,
     /// Maximum number of changed groups in one explanation; all groups together are a separate explanation. Default
@@ -69,6 +69,7 @@ impl Default for ChangeSettings {
         Self {
             scales: vec![0.1, 0.3, 1.0, 3.0],
             error_factors: vec![1.0, 1.5, 2.0],
+            pair_ratios: vec![1.0],
             probability: 0.05,
             most_groups: 2,
             candidates: 8,
@@ -89,6 +90,8 @@ impl ChangeSettings {
         require(positive(&self.scales), "scales", first(&self.scales), "give one or more positive factors")?;
         let factors = &self.error_factors;
         require(positive(factors), "error_factors", first(factors), "give one or more positive factors")?;
+        let ratios = &self.pair_ratios;
+        require(positive(ratios), "pair_ratios", first(ratios), "give one or more positive factors")?;
         let is_rare = self.probability > 0.0 && self.probability <= 0.5;
         require(is_rare, "probability", self.probability, "give more than 0 and at most 0.5")?;
         Ok(())
@@ -236,8 +239,7 @@ impl Whitened<'_> {
     /// A pair with the mean evidence of all ratios of its scales, and the explanation at the best ratio.
     fn at_all_ratios(&self, equal: &(f64, Explanation), prior: f64) -> (f64, Explanation) {
         let other = |ratio: &f64| self.explained(&equal.1.groups, &[1.0, *ratio], prior);
-        let mut all: Vec<(f64, Explanation)> = PAIR_RATIOS[1..].iter().map(other).collect();
-        all.push(equal.clone());
+        let all: Vec<(f64, Explanation)> = self.settings.pair_ratios.iter().map(other).collect();
         let log = mean_of_logarithms(all.iter().map(|(log, _)| *log));
         let best = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         best.map_or_else(|| equal.clone(), |(_, explanation)| (log, explanation))

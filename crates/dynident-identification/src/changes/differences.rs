@@ -24,8 +24,8 @@ const EXPECTED_FACTOR: f64 = 0.5;
 /// a factor, and the rest is small.
 const FACTOR_WITH_LOAD: f64 = 5.0;
 
-/// Prior probability of a change of terms, and of each of the three ways in which a body changes: a load, a common
-/// factor of all its values, or both.
+/// Prior probability of a change of terms, and of each way in which a body changes: a load, a common factor of all its
+/// values, or both.
 const CHANGE_PROBABILITY: f64 = 0.025;
 
 /// Factors of the error bars of a difference from a description, with the same probability: error bars for correlated
@@ -97,7 +97,7 @@ impl Differences {
         let sizes = SPREADS.to_vec();
         let effects = all.columns(0, inertial).into_owned();
         let all = parts(robot.model(), base, rows, &absolute);
-        let (parts, unknowns, groups) = groups(robot, all, &effects, |part| part.body().is_some());
+        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Description);
         let mut found = Self {
             explanations: Vec::new(),
             parts,
@@ -109,7 +109,8 @@ impl Differences {
             sizes,
         };
         // Only the error bars have a factor: friction is unknown, and differences of bodies have their own sizes.
-        let settings = ChangeSettings { error_factors: vec![1.0], ..settings() };
+        let pair_ratios = vec![1.0, 1.0 / 3.0, 3.0];
+        let settings = ChangeSettings { error_factors: vec![1.0], pair_ratios, ..settings() };
         found.explain(&groups, bars, &ERROR_FACTORS, &settings)?;
         let probability = |own: &Spread| {
             let of_all = if own.is_small() { SMALL_PROBABILITY } else { 1.0 - SMALL_PROBABILITY };
@@ -142,7 +143,7 @@ impl Differences {
         let larger: Vec<f64> = first.iter().zip(&second).map(|(first, second)| first.max(*second)).collect();
         let effects = effects(robot.base()).select_rows(rows).columns(0, inertial).into_owned();
         let all = parts(robot.model(), robot.base(), rows, &larger);
-        let (parts, unknowns, groups) = groups(robot, all, &effects, |_| true);
+        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Estimate);
         let mut found = Self {
             explanations: Vec::new(),
             parts,
@@ -302,18 +303,26 @@ impl Differences {
     }
 }
 
-/// Groups of unknowns for the parts that are `tested`. A body has three groups: a change of its ten values, as by a
-/// load, a common factor of all its values, and both together. The group of another part contains its terms. Returns the part of each group,
-/// the change of the values per unknown, and the effect on the base parameters.
+/// What an estimate is compared with.
+#[derive(Clone, Copy, PartialEq)]
+enum Reference {
+    Description,
+    Estimate,
+}
+
+/// Groups of unknowns. A body has a group for a change of its ten values, as by a load, and one for a common factor of
+/// all its values. Relative to a description it has a third group for both together, and the terms of joints are not
+/// tested. Returns the part of each group, the change of the values per unknown, and the effect on the base parameters.
 fn groups(
     robot: &ParametricModel,
     all: Parts,
     effects: &DMatrix<f64>,
-    tested: impl Fn(&Part) -> bool,
+    reference: Reference,
 ) -> (Vec<Part>, Vec<DMatrix<f64>>, Vec<ChangeGroup>) {
     let (mut parts, mut unknowns, mut groups) = (Vec::new(), Vec::new(), Vec::new());
     for ((part, group), sizes) in all.parts.into_iter().zip(all.groups).zip(all.sizes) {
-        if !tested(&part) {
+        let is_description = reference == Reference::Description;
+        if is_description && part.body().is_none() {
             continue;
         }
         let own = DMatrix::from_diagonal(&sizes);
@@ -321,7 +330,8 @@ fn groups(
             let factor = nominal_values(robot, body) * EXPECTED_FACTOR;
             let mut both = own.clone().insert_column(sizes.len(), 0.0);
             both.set_column(sizes.len(), &(&factor * FACTOR_WITH_LOAD));
-            for unknown in [DMatrix::from_column_slice(factor.len(), 1, factor.as_slice()), both] {
+            let factor = DMatrix::from_column_slice(factor.len(), 1, factor.as_slice());
+            for unknown in [Some(factor), is_description.then_some(both)].into_iter().flatten() {
                 parts.push(part.clone());
                 let effect = effects.columns(10 * body, 10) * &unknown;
                 groups.push(ChangeGroup { name: group.name.clone(), effect });

@@ -6,7 +6,6 @@ mod laws;
 mod recovery;
 mod refused;
 mod starts;
-mod steps;
 
 use dynident_model::load_robot;
 use dynident_servo::{Drive, ServoRobot};
