@@ -9,10 +9,10 @@
 //! p(d | groups) = N(d; 0, c² C + s² Σ_g B_g B_gᵀ)
 //! ```
 //!
-//! The scales `s` of the changes and `c` of the error bars are not known; the evidence is the mean over the values in
-//! [`ChangeSettings`]. The scales of two groups have the ratios [`ChangeSettings::pair_ratios`]: a large tool at the flange may
-//! occur together with a small change of a heavy link. The odds of two explanations are the ratios of evidence times
-//! prior probability.
+//! The scales `s` of the changes and `c` of the error bars are not known; the evidence is the mean over the values
+//! in [`ChangeSettings`]. The scales of two groups have the ratios [`ChangeSettings::pair_ratios`]: a large tool at
+//! the flange may occur together with a small change of a heavy link. The odds of two explanations are the ratios of
+//! evidence times prior probability.
 //!
 //! If everything may differ a little, the size of these small differences is not known either. [`explanations`]
 //! therefore accepts several covariances `C`, such as those of the error bars plus small differences of several sizes,
