@@ -23,6 +23,7 @@ mod kind;
 mod noise;
 mod normal;
 mod overflow;
+mod quiet;
 mod robust;
 mod rows;
 mod scan;

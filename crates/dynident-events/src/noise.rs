@@ -1,7 +1,7 @@
 //! Usual residual of each joint in each bin, as a function of the state of motion.
 
+use crate::quiet::quiet;
 use crate::rows::{LogRows, median};
-use crate::scan::quiet;
 
 /// Velocity below which a joint is treated as reversing or resting, relative to its root mean square velocity.
 const REVERSAL_SHARE: f64 = 0.15;

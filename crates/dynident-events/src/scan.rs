@@ -2,6 +2,7 @@
 
 use crate::noise::usual_variance;
 use crate::normal::Normal;
+use crate::quiet::{MIN_TORQUE_SHARE, quiet};
 use crate::robust::{Blocks, Fit, dry_friction, residuals};
 use crate::rows::{LogRows, rms};
 use crate::settings::EventSettings;
@@ -20,16 +21,11 @@ const MIN_SUM: f64 = 20.0;
 const MIN_BINS: usize = 2;
 /// Maximum distance between intervals that are merged into one event, s.
 const MERGE_S: f64 = 0.3;
-/// Smallest torque of a joint relative to the largest of all joints (root mean square) that is used as its reference.
-/// For joints with less torque, this share of the largest torque is used.
-const MIN_TORQUE_SHARE: f64 = 0.1;
 /// Minimum ratio of predicted to measured torque (squares) if the drives are off.
 const OFF_RATIO: f64 = 10.0;
 /// Minimum predicted torque with which drives can be reported as off, relative to the usual residual of the joint
 /// (squares).
 const OFF_PREDICTED: f64 = 16.0;
-/// Maximum torque of each joint if the drives are off, relative to its root mean square torque in the log.
-const OFF_TORQUE_SHARE: f64 = 0.1;
 /// Minimum duration of a rest with the drives off, s.
 const MIN_OFF_S: f64 = 0.3;
 /// Longest interruption by noise, bins, of a rest without torque.
@@ -204,15 +200,6 @@ fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
     }
     found.retain(|range| range.len() as f64 * rows.bin_s >= MIN_OFF_S);
     found
-}
-
-/// Whether all torques of a bin are small.
-pub(crate) fn quiet(rows: &LogRows) -> Vec<bool> {
-    let largest = rows.tau.iter().map(|tau| rms(tau)).fold(0.0, f64::max);
-    let scale = |tau: &Vec<f64>| OFF_TORQUE_SHARE * rms(tau).max(MIN_TORQUE_SHARE * largest);
-    let scales: Vec<f64> = rows.tau.iter().map(scale).collect();
-    let is_quiet = |bin: usize| (0..rows.joints()).all(|joint| rows.tau[joint][bin].abs() <= scales[joint]);
-    (0..rows.len()).map(is_quiet).collect()
 }
 
 /// Two ranges: the longest rest without torque inside `range`, and this rest extended by the adjacent bins without

@@ -200,7 +200,8 @@ fn masses_and_gains_of_a_bench_are_named() {
         let entries: Vec<String> = rows()
             .iter()
             .map(|row| {
-                format!("{{\"timestamp\": {}, \"position\": {}, \"goal_position\": {}}}", row[0], row[1], row[3])
+                let position = row[1] - 0.01 * mass;
+                format!("{{\"timestamp\": {}, \"position\": {position}, \"goal_position\": {}}}", row[0], row[3])
             })
             .collect();
         let text = format!("{{\"mass\": {mass}, \"kp\": {kp}, \"entries\": [{}]}}", entries.join(", "));

@@ -88,8 +88,11 @@ fn columns_that_belong_together_are_named() {
             },
             study: SAME,
             kind: "coupling",
+            // The inertia of the last joint is too small to distinguish the sign of its motion, so that the sentence
+            // lists the other matrices too.
             named: &[
                 "[0.0, 0.0, 0.0, 0.0, 0.5, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5, -0.5]]`; in [format.torque] write `matrix",
+                "[0.0, 0.0, 0.0, 0.0, 0.5, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5, -0.5]], [format.torque] matrix",
             ],
         },
         Case {
