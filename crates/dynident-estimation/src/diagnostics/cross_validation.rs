@@ -265,7 +265,7 @@ impl JointFolds {
         if whole > 0.0 && left > 0.0 { whole / left } else { f64::INFINITY }
     }
 
-    /// Errors of the model with the candidate columns `chosen` (places in [`variable`](Self::variable)) and the common
+    /// Errors of the model with the candidate columns `chosen` (places in `variable`) and the common
     /// ones; coefficients with `nonnegative` set are constrained to zero or more.
     ///
     /// # Panics

@@ -184,7 +184,7 @@ impl RecognisedColumns {
     fn command_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
         let reason = format!(
-            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot. With known gains of the position controllers (MIT mode), `sum` in [format.torque] gives the torque instead: `dynident docs recordings-mit-mode`",
+            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot. With known gains of the position controllers (MIT mode), `sum` in [format.torque] gives the torque instead: `dynident docs mit-mode`",
             basis(&self.drive, "positions", &self.alternatives[2])
         );
         let table = Table::new("[format.command]", reason);
