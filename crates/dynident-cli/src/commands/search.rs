@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// What Ctrl-C does during a search.
+/// Reaction to Ctrl-C during a search.
 #[derive(Clone, Copy)]
 pub(crate) enum OnInterrupt {
     KeepsBest,

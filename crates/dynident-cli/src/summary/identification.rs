@@ -15,7 +15,7 @@ const MAX_SHOWN: usize = 6;
 /// Maximum number of held-out logs for which the table shows RMS values and the errors of the prior.
 const MAX_DETAILED_LOGS: usize = 2;
 const MIN_REPORTED_RATIO: f64 = 1.5;
-/// Maximum number of held-out logs with a column of their own.
+/// Maximum number of held-out logs for which the table has one column each.
 const MAX_LOG_COLUMNS: usize = 5;
 const EXPRESSION_COLUMNS: usize = 44;
 

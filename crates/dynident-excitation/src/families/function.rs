@@ -125,7 +125,7 @@ impl FunctionFamily {
         (0..self.parameters).map(of).collect()
     }
 
-    /// Parameters of the constant motion with value 1, by least squares; `None` if there are none.
+    /// Parameters of the constant motion with value 1, by least squares; `None` if the family does not contain it.
     fn standing(&self, times_s: &[f64]) -> Option<Vec<f64>> {
         let columns = self.columns(times_s);
         let mut standing = Vec::new();
