@@ -49,6 +49,10 @@ pub struct LagChoice {
     /// χ² of the differences between the joints' lags and the common lag, per degree of freedom; far above 1 if the
     /// joints have different lags.
     pub scatter: Option<f64>,
+    /// Time by which the friction of each joint changes its sign later than the filtered velocity, s (negative:
+    /// earlier), besides the lag; `null` for a joint without such friction. Empty if these times are not significant.
+    #[serde(default)]
+    pub reversal_s: Vec<Option<f64>>,
 }
 
 impl LagChoice {
@@ -73,6 +77,24 @@ impl LagChoice {
 
     /// The selection as a sentence without a full stop; `None` if there is nothing to report.
     pub fn sentence(&self) -> Option<String> {
+        let sentences: Vec<String> = self.lag_sentence().into_iter().chain(self.reversal_sentence()).collect();
+        (!sentences.is_empty()).then(|| sentences.join("; "))
+    }
+
+    fn reversal_sentence(&self) -> Option<String> {
+        let times_s = || self.reversal_s.iter().flatten().copied();
+        let [low, high] = [times_s().fold(f64::INFINITY, f64::min), times_s().fold(f64::NEG_INFINITY, f64::max)];
+        (low <= high).then(|| {
+            format!(
+                "friction changes its sign {:.1} to {:.1} ms after the filtered velocity (negative: before), as if joints \
+                 stick at reversals; the error bars include this",
+                1e3 * low,
+                1e3 * high
+            )
+        })
+    }
+
+    fn lag_sentence(&self) -> Option<String> {
         let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
         let taken_off = || self.lag_s.first().copied().unwrap_or(0.0);
         let side = |lag_s: f64| if lag_s < 0.0 { "before" } else { "after" };
@@ -111,12 +133,16 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
         _ => 0.0,
     };
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
-    let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
+    let mut reversal_s = vec![None; if fit.reversals.is_empty() { 0 } else { dof }];
+    for reversal in &fit.reversals {
+        reversal_s[reversal.joint] = Some(reversal.late_s);
+    }
+    let as_before = LagChoice { lag_s: taken_off.to_vec(), reversal_s, ..LagChoice::default() };
     let all = informative_joints(fit);
     let Some(CommonLag { lag, scatter, .. }) = common(fit, &all) else { return as_before };
     let thresholds = &fit.thresholds;
     let matters = |rest: &[f64]| {
-        let moved = fit.answers() * DVector::from_column_slice(rest);
+        let moved = fit.lag_answers() * DVector::from_column_slice(rest);
         moved
             .iter()
             .take(fit.parameters)
@@ -157,11 +183,12 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
 /// Effect of the lag's uncertainty on parameters and unknown gains: `S Σ_δ^½` with the sensitivity `S = ∂θ/∂δ` and the
 /// covariance Σ_δ of the lags, for a common lag or for separate lags. If no lag was compensated, the uncertainty is
 /// limited by the prior knowledge of lags. `None` for a stated lag. If joints cannot have separate lags (`candidates`),
-/// the spread of their lags remains in the rows and is part of the uncertainty.
+/// the spread of their lags remains in the rows and is part of the uncertainty. The times of reversal are not
+/// compensated, so they are part of it with their values.
 fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Option<DMatrix<f64>> {
-    let answers = fit.answers();
+    let answers = fit.lag_answers();
     let usual = |std_s: f64| (std_s.powi(-2) + fit.usual_lag_s.powi(-2)).powf(-0.5);
-    Some(match choice.kind {
+    let of_lags = match choice.kind {
         LagKind::Stated => return None,
         LagKind::Joints => {
             // The errors of separate lags are independent.
@@ -185,7 +212,10 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
                 Some(joint) => own[(row, joint)],
             })
         }
-    })
+    };
+    let of_reversals = fit.reversal_error();
+    let columns = of_lags.column_iter().chain(of_reversals.column_iter()).collect::<Vec<_>>();
+    Some(DMatrix::from_columns(&columns))
 }
 
 /// Covariance `S Σ_δ Sᵀ` that the error of the lags adds to an estimate (S: sensitivity, Σ_δ: covariance of the lags).

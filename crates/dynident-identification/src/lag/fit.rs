@@ -6,9 +6,13 @@
 //! `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t`, with the regressor Y and the torque τ taken `d` later. This is repeated
 //! until `d` equals δ. The covariance of the lag is that of the last step, computed from time segments. It includes
 //! model errors (backlash, elasticity) if they differ between segments.
+//!
+//! A joint that sticks at each reversal changes the sign of its friction at another time than the filtered velocity.
+//! If this is significant, the [time of reversal](super::reversal) is estimated with the lag.
 
 use super::measured::TorqueLag;
-use super::rows::{DelayRows, NODES, lagrange};
+use super::reversal::{self, Reversal};
+use super::rows::{DelayRows, NODES, SLOPES, lagrange};
 use super::samples::DelayCheck;
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
@@ -30,13 +34,17 @@ const CONVERGENCE: (f64, f64) = (0.02, 1.0e-6);
 /// Lags of the joints, estimated together with the parameters.
 #[derive(Debug)]
 pub struct LagFit {
-    /// Result of the last step: parameters, unknown gains, then the change of each joint's lag, s.
+    /// Result of the last step: parameters, unknown gains, the change of each joint's lag (s), then the time by which
+    /// the friction of each joint changes its sign later than the velocity (s), if it was estimated.
     pub(crate) last: Estimate,
     /// Number of parameters: base parameters, payloads, and offsets of single logs.
     pub(crate) parameters: usize,
     pub(crate) first: usize,
     /// Time by which the torque of each joint is later than its motion; `None` if the samples do not determine it.
     pub(crate) joints: Vec<Option<TorqueLag>>,
+    /// Times by which the friction of the joints changes its sign later than the velocity; empty if they are not
+    /// significant.
+    pub(crate) reversals: Vec<Reversal>,
     pub(crate) rows: Vec<usize>,
     pub(crate) usual_lag_s: f64,
     pub(crate) thresholds: LagThresholds,
@@ -48,11 +56,14 @@ impl LagFit {
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// Sensitivity of parameters and unknown gains θ to the lag δ of each joint, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, per
-    /// second; zero for a lag that the samples do not determine.
+    /// Sensitivity of parameters and unknown gains θ to the lags and the times of reversal λ of all joints,
+    /// `∂θ/∂λ = Cov(θ, λ) Cov(λ, λ)⁻¹`, per second: one column for the lag of each joint, then one for its time of
+    /// reversal if it was estimated. Zero for a λ that the samples do not determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
-        let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
-        let mut answers = DMatrix::zeros(self.first, self.joints.len());
+        let dof = self.joints.len();
+        let of_reversals = self.reversals.iter().map(|reversal| dof + reversal.joint);
+        let known: Vec<usize> = (0..dof).filter(|&joint| self.joints[joint].is_some()).chain(of_reversals).collect();
+        let mut answers = DMatrix::zeros(self.first, self.last.values.len() - self.first);
         let white = &self.last.covariance_white;
         let own =
             DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.first + known[a], self.first + known[b])]);
@@ -64,6 +75,22 @@ impl LagFit {
             }
         }
         answers
+    }
+
+    /// Sensitivity of parameters and unknown gains to the lag of each joint, per second ([`answers`](Self::answers)).
+    pub(crate) fn lag_answers(&self) -> DMatrix<f64> {
+        self.answers().columns(0, self.joints.len()).into_owned()
+    }
+
+    /// Error of parameters and unknown gains because the friction of the model changes its sign with the velocity: the
+    /// sensitivity to each time of reversal, multiplied by the root of `ε² + σ²` (time ε, standard deviation σ).
+    pub(crate) fn reversal_error(&self) -> DMatrix<f64> {
+        let answers = self.answers();
+        let of = |reversal: &Reversal| {
+            answers.column(self.joints.len() + reversal.joint) * reversal.late_s.hypot(reversal.std_s)
+        };
+        let columns: Vec<_> = self.reversals.iter().map(of).collect();
+        if columns.is_empty() { DMatrix::zeros(self.first, 0) } else { DMatrix::from_columns(&columns) }
     }
 
     /// Share of the squared residual of a joint that a separate lag of this joint explains.
@@ -81,6 +108,8 @@ struct Samples<'a> {
     unknowns: Unknowns<'a>,
     rows: Vec<Vec<DelayRows>>,
     lag_s: Vec<f64>,
+    /// Prior standard deviation of the times of reversal, s; `None` if they are not estimated.
+    reversal: Option<f64>,
 }
 
 /// Fits the lags of the joints, which are common to all logs. `noise` states whether logs have separate noise levels.
@@ -131,26 +160,40 @@ fn fitted(
     let mut samples = Samples::new(checks, unknowns, with, (0..dof).into_par_iter().map(start).collect())?;
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
-    for _ in 0..MAX_STEPS {
-        let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &settings.weighted())?;
-        let mut has_converged = true;
-        for joint in 0..dof {
-            let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
-            has_converged &= rest.abs() <= (CONVERGENCE.0 * std).max(CONVERGENCE.1 / fastest_hz);
-            samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
+    let estimated = |samples: &Samples<'_>| {
+        weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &settings.weighted())
+    };
+    let repeated = |samples: &mut Samples<'_>| -> Result<(), EstimationError> {
+        for _ in 0..MAX_STEPS {
+            let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &settings.weighted())?;
+            let mut has_converged = true;
+            for joint in 0..dof {
+                let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
+                has_converged &= rest.abs() <= (CONVERGENCE.0 * std).max(CONVERGENCE.1 / fastest_hz);
+                samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
+            }
+            samples.follow()?;
+            if has_converged {
+                break;
+            }
         }
-        samples.follow()?;
-        if has_converged {
-            break;
-        }
+        Ok(())
+    };
+    repeated(&mut samples)?;
+    samples.reversal = Some(f64::INFINITY);
+    let free = estimated(&samples)?;
+    samples.reversal = reversal::spread_s(&free, first + dof, settings.thresholds.lag.max_reversal_std);
+    if samples.reversal.is_some() {
+        repeated(&mut samples)?;
     }
-    let last = weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &settings.weighted())?;
+    let last = estimated(&samples)?;
+    let reversals = samples.reversal.map_or_else(Vec::new, |_| reversal::of_joints(&last, first + dof));
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
     let usual_lag_s = own.seconds(settings.thresholds.lag.prior_std_s);
     let (parameters, thresholds) = (unknowns.values.len(), settings.thresholds.lag);
-    Ok(LagFit { last, parameters, first, joints, rows, usual_lag_s, thresholds })
+    Ok(LagFit { last, parameters, first, joints, reversals, rows, usual_lag_s, thresholds })
 }
 
 impl<'a> Samples<'a> {
@@ -165,7 +208,7 @@ impl<'a> Samples<'a> {
             (0..lag_s.len()).into_par_iter().map(of_joint).collect()
         };
         let rows = checks.par_iter().map(of_log).collect::<Result<_, _>>()?;
-        Ok(Self { checks, with, unknowns, rows, lag_s })
+        Ok(Self { checks, with, unknowns, rows, lag_s, reversal: None })
     }
 
     /// Computes the rows again if the lag is no longer between the samples (nodes) that they interpolate.
@@ -209,7 +252,7 @@ impl<'a> Samples<'a> {
     }
 
     /// Least-squares problem with the columns for parameters and unknown gains, then for the uncompensated lag of every
-    /// joint, s.
+    /// joint, s, then for its time of reversal, s.
     fn problem(
         &self,
         factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
@@ -217,25 +260,44 @@ impl<'a> Samples<'a> {
         let model = self.checks[0].model();
         let layout = model.layout();
         let (first, dof) = (self.unknowns.count(), self.lag_s.len());
-        let names = (0..first + dof).map(|column| format!("column {column}")).collect();
+        let reversals = if self.reversal.is_some() { dof } else { 0 };
+        let columns = first + dof + reversals;
+        let names = (0..columns).map(|column| format!("column {column}")).collect();
         let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
         // Parameters that the rows do not determine keep their fitted values, because the slope was computed with them.
         let mut fallback = self.unknowns.values.to_vec();
-        fallback.resize(first + dof, 0.0);
+        fallback.resize(columns, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
+        if let Some(prior_s) = self.reversal.filter(|prior_s| prior_s.is_finite()) {
+            let information =
+                DMatrix::from_fn(
+                    dof,
+                    columns,
+                    |row, column| {
+                        if column == first + dof + row { prior_s.recip() } else { 0.0 }
+                    },
+                );
+            problem = problem.with_prior(vec![0.0; columns], information)?;
+        }
         for (number, (check, rows)) in self.checks.iter().zip(&self.rows).enumerate() {
             let mapped = |(joint, rows): (usize, &DelayRows)| {
                 let own = layout.joint_columns(joint);
                 let mut seen = self.unknowns.seen(number, joint, own, check.theta());
                 let lag = seen.columns.len();
                 seen.columns.push(first + joint);
-                let mut map = DMatrix::zeros(own.len() + 1 + NODES, lag + 2);
+                if reversals > 0 {
+                    seen.columns.push(first + dof + joint);
+                }
+                let torque = seen.columns.len();
+                let mut map = DMatrix::zeros(own.len() + SLOPES + NODES, torque + 1);
                 map.view_mut((0, 0), (own.len(), lag)).copy_from(&seen.map);
-                map.view_mut((0, lag + 1), (own.len(), 1)).copy_from(&-seen.known);
-                map[(own.len(), lag)] = check.rate_hz();
+                map.view_mut((0, torque), (own.len(), 1)).copy_from(&-seen.known);
+                for slope in 0..torque - lag {
+                    map[(own.len() + slope, lag + slope)] = check.rate_hz();
+                }
                 let shift = self.lag_s[joint] * check.rate_hz();
                 for (node, weight) in lagrange(shift - rows.centre as f64).into_iter().enumerate() {
-                    map[(own.len() + 1 + node, lag + 1)] = weight;
+                    map[(own.len() + SLOPES + node, torque)] = weight;
                 }
                 Ok((seen.columns, factor(rows).mapped(&map)?))
             };

@@ -5,6 +5,7 @@ mod choice;
 mod fit;
 mod measured;
 mod pass;
+mod reversal;
 mod rounds;
 mod rows;
 mod samples;

@@ -1,5 +1,5 @@
-//! Rows for the estimation of a lag. A row contains the regressor, the time derivative of the predicted torque, and the
-//! torque at six neighbouring samples (nodes) between which it is interpolated.
+//! Rows for the estimation of a lag. A row contains the regressor, the time derivatives of the predicted torque and of
+//! its friction step, and the torque at six neighbouring samples (nodes) between which it is interpolated.
 
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
@@ -7,6 +7,8 @@ use dynident_rows::{JointRows, divide_by_coverage as divide};
 
 /// Number of samples (nodes) for the interpolation of the torque.
 pub(crate) const NODES: usize = 6;
+/// Number of columns with time derivatives, before those of the nodes.
+pub(crate) const SLOPES: usize = 2;
 /// Index of the first node relative to the central sample.
 const FIRST_NODE: isize = -2;
 /// Number of samples on each side that the time derivative needs.
@@ -16,6 +18,8 @@ pub(crate) struct Piece {
     pub(crate) segment: usize,
     /// Predicted torque of each sample, by joint.
     pub(crate) model: Vec<Vec<f64>>,
+    /// Predicted torque of the friction that changes its sign with the velocity, of each sample, by joint.
+    pub(crate) step: Vec<Vec<f64>>,
     /// Measured torque of each sample, by joint.
     pub(crate) measured: Vec<Vec<f64>>,
     /// Indices of invalid samples, ascending, by joint.
@@ -35,7 +39,7 @@ impl Piece {
     pub(crate) fn new(segment: usize, joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
         let rows = (0..joints).map(|_| Vec::new()).collect();
-        Self { segment, model: none(), measured: none(), left_out: vec![Vec::new(); joints], rows }
+        Self { segment, model: none(), step: none(), measured: none(), left_out: vec![Vec::new(); joints], rows }
     }
 
     /// Marks the invalid samples among the samples that were added last.
@@ -46,8 +50,8 @@ impl Piece {
     }
 }
 
-/// Filtered rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]` of one joint: regressor Y, time derivative of the predicted
-/// torque Yθ, and torque τ. The last node is in the column of the torque.
+/// Filtered rows `[Y | −∂(Yθ)/∂t | −∂τ_s/∂t | τ at the six nodes]` of one joint: regressor Y, time derivatives of the
+/// predicted torque Yθ and of its friction step τ_s, and torque τ. The last node is in the column of the torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
     pub(crate) merged: SegmentedFactor,
@@ -69,12 +73,13 @@ impl DelayRows {
         segments: SegmentSettings,
     ) -> Result<Self, EstimationError> {
         let centre = shift.floor() as isize;
-        let mut factor = SegmentedFactor::new(columns + NODES, segments)?;
+        let mut factor = SegmentedFactor::new(columns + SLOPES + NODES - 1, segments)?;
         let mut panel = Vec::new();
         let (mut shares, mut counted) = (Vec::new(), Vec::new());
         for piece in pieces {
             let (measured, left_out) = (&piece.measured[joint], &piece.left_out[joint]);
-            let further = LagColumns::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
+            let predicted = [&piece.model[joint][..], &piece.step[joint]];
+            let further = LagColumns::new(predicted, measured, left_out, centre, rate_hz, filter);
             let mut first = 0;
             for FilteredRows { rows, regressor, coverage } in &piece.rows[joint] {
                 let from = further.valid.start.max(first).min(first + rows);
@@ -109,7 +114,7 @@ impl DelayRows {
     }
 }
 
-/// Filtered time derivative of the torque, filtered shifted torques, and the range of rows for which all samples exist.
+/// Filtered time derivatives, filtered shifted torques, and the range of rows for which all samples exist.
 struct LagColumns {
     rows: usize,
     values: Vec<f64>,
@@ -117,26 +122,30 @@ struct LagColumns {
 }
 
 impl LagColumns {
-    /// Computes the columns from the predicted torque, the measured torque, and the indices of samples that are invalid
-    /// in the regressor.
+    /// Computes the columns from the predicted torque and its friction step, the measured torque, and the indices of
+    /// samples that are invalid in the regressor.
     fn new(
-        model: &[f64],
+        predicted: [&[f64]; SLOPES],
         measured: &[f64],
         left_out: &[usize],
         centre: isize,
         rate_hz: f64,
         filter: Option<&DecimationSettings>,
     ) -> Self {
-        let n = model.len() as isize;
+        let samples = measured.len();
+        let n = samples as isize;
         let at = |signal: &[f64], k: isize| usize::try_from(k).ok().and_then(|k| signal.get(k).copied()).unwrap_or(0.0);
         // Finite differences of fourth order: the error is below 1 % at a tenth of the sample rate.
         let slope =
-            |k: isize| (8.0 * (at(model, k + 1) - at(model, k - 1)) - (at(model, k + 2) - at(model, k - 2))) / 12.0;
-        let mut signals: Vec<f64> = (0..n).map(|k| -slope(k)).collect();
+            |of: &[f64], k: isize| (8.0 * (at(of, k + 1) - at(of, k - 1)) - (at(of, k + 2) - at(of, k - 2))) / 12.0;
+        let mut signals = Vec::with_capacity((SLOPES + NODES) * samples);
+        for of in predicted {
+            signals.extend((0..n).map(|k| -slope(of, k)));
+        }
         for node in 0..NODES as isize {
             signals.extend((0..n).map(|k| at(measured, k + centre + FIRST_NODE + node)));
         }
-        for column in signals.chunks_exact_mut(model.len().max(1)) {
+        for column in signals.chunks_exact_mut(samples.max(1)) {
             for &sample in left_out {
                 column[sample] = 0.0;
             }
@@ -144,7 +153,7 @@ impl LagColumns {
         let last_node = FIRST_NODE + NODES as isize - 1;
         let low = SLOPE_REACH.max(-(centre + FIRST_NODE)).max(0);
         let high = n - SLOPE_REACH.max(centre + last_node).max(0);
-        let decimator = filter.and_then(|settings| Decimator::new(settings, rate_hz, NODES + 1).ok());
+        let decimator = filter.and_then(|settings| Decimator::new(settings, rate_hz, SLOPES + NODES).ok());
         let Some(mut decimator) = decimator else {
             let valid = low.min(n) as usize..high.max(low.min(n)) as usize;
             return Self { rows: n as usize, values: signals, valid };
@@ -189,14 +198,14 @@ mod tests {
     fn rows_at_the_ends_are_invalid() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
-            let found = LagColumns::new(&signal, &signal, &[], centre, 100.0, None);
+            let found = LagColumns::new([&signal; SLOPES], &signal, &[], centre, 100.0, None);
             assert_eq!(found.valid, valid, "{centre}");
             for k in valid {
                 // The slope of a ramp, and the ramp shifted.
                 assert!((found.values[k] + 1.0).abs() < 1e-12);
-                assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
+                assert_eq!(found.values[100 + k], (k as isize + centre - 2) as f64);
             }
         }
-        assert!(LagColumns::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
+        assert!(LagColumns::new([&signal[..3]; SLOPES], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
     }
 }

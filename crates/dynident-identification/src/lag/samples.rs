@@ -2,6 +2,7 @@
 
 use super::rows::{DelayRows, FilteredRows, Piece};
 use crate::estimators::EstimationSettings;
+use dynident_dynamics::Column;
 use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, Decimator, best_lag};
 use dynident_rows::{JointRows, Logs, RawSamples, RegressorModel, motion_band_hz, predicted_torque};
@@ -58,9 +59,11 @@ impl<'a> DelayCheck<'a> {
             let panel = samples.panels.joint(joint);
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
             piece.model[joint].extend_from_slice(&self.buffer);
+            step_torque(self.model, panel, joint, self.theta, &mut self.buffer);
+            piece.step[joint].extend_from_slice(&self.buffer);
             piece.measured[joint].extend_from_slice(&panel[columns.len() * rows..]);
             piece.leave_out(joint, samples.set_aside.get(joint).map_or(&[], Vec::as_slice));
-            self.numbers += 2 * rows;
+            self.numbers += 3 * rows;
         }
     }
 
@@ -105,5 +108,20 @@ impl<'a> DelayCheck<'a> {
         let columns = self.model.layout().joint_columns(joint).len();
         let filter = logs.filter.decimation(self.rate_hz, motion_band_hz(&logs.motion));
         DelayRows::new(&self.pieces, joint, columns, self.rate_hz, filter.as_ref(), shift, settings.segments)
+    }
+}
+
+/// Computes the torque that the friction with a sign function predicts for the rows of one joint, one value per row.
+fn step_torque(model: &RegressorModel, panel: &[f64], joint: usize, theta: &[f64], out: &mut [f64]) {
+    let rows = out.len();
+    out.fill(0.0);
+    let layout = model.layout();
+    for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+        let Column::Term(term) = &layout.columns()[column] else { continue };
+        if term.step_width().is_some() {
+            for (to, x) in out.iter_mut().zip(&panel[place * rows..(place + 1) * rows]) {
+                *to += theta[column] * x;
+            }
+        }
     }
 }

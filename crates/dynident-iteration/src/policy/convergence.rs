@@ -476,7 +476,7 @@ mod tests {
     fn lag(lag_s: f64, half_width_95_s: f64) -> LagChoice {
         let std_s = 0.5 * half_width_95_s;
         let common = TorqueLag { lag_s, std_s, half_width_95_s, matters: false, taken_off_s: lag_s };
-        LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; 6], common: Some(common), scatter: None }
+        LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; 6], common: Some(common), ..LagChoice::default() }
     }
 
     /// A correct TX40, whose log was 6.2 ms late: the estimate was 15.0 ms with a 95 % interval of 5.0 ms, and the
