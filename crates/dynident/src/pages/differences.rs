@@ -3,8 +3,11 @@
 use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison, ResultFile};
 use dynident_report::short;
 
-/// Minimum probability with which an explanation by single bodies is reported.
+/// Minimum probability with which an explanation by single bodies is reported as a possibility.
 const MIN_REPORTED_PROBABILITY: f64 = 0.5;
+
+/// Minimum probability with which it is reported as a fact, with the edit test.
+const MIN_CERTAIN_PROBABILITY: f64 = 0.95;
 
 /// Minimum probability with which an alternative explanation is listed.
 const MIN_ALTERNATIVE_PROBABILITY: f64 = 0.1;
@@ -18,19 +21,29 @@ pub fn difference_words(r: &ResultFile) -> Vec<String> {
     if best.parts.is_empty() || few < MIN_REPORTED_PROBABILITY {
         return Vec::new();
     }
+    let is_certain = few >= MIN_CERTAIN_PROBABILITY;
     let changes: Vec<String> = best.parts.iter().map(change).collect();
-    let mut words = vec![format!("{} (probability {:.0} %)", changes.join("; "), 100.0 * best.probability)];
-    let is_other = |own: &&ChangeExplanation| own.probability >= MIN_ALTERNATIVE_PROBABILITY && !own.parts.is_empty();
-    let others: Vec<String> = found.explanations.iter().skip(1).filter(is_other).map(alternative).collect();
+    let perhaps = if is_certain { "" } else { "perhaps " };
+    let mut words = vec![format!("{perhaps}{} (probability {:.0} %)", changes.join("; "), 100.0 * best.probability)];
+    let is_listed = |own: &&ChangeExplanation| own.probability >= MIN_ALTERNATIVE_PROBABILITY;
+    let others: Vec<String> = found.explanations.iter().skip(1).filter(is_listed).map(alternative).collect();
     if !others.is_empty() {
         words.push(format!("It could also be: {}", others.join("; or ")));
     }
-    words.push(String::from(if found.is_followed {
-        "The exported model follows this; the other bodies keep the values of the robot description within its tolerance"
+    if found.is_followed {
+        words.push(
+            "The exported model follows this; the other bodies keep the values of the robot description within its tolerance"
+                .to_owned(),
+        );
     } else {
-        "The exported model is valid, but it may spread this change over several bodies, because the logs do not locate it well enough"
-    }));
-    words.extend(best.parts.iter().filter_map(|part| edit_test(found, part)));
+        words.push(
+            "The logs do not show which bodies differ; the exported model predicts the torque, but single masses may be wrong"
+                .to_owned(),
+        );
+    }
+    if is_certain || found.is_followed {
+        words.extend(best.parts.iter().filter_map(|part| edit_test(found, part)));
+    }
     words
 }
 
@@ -38,10 +51,9 @@ fn change(part: &ChangedPart) -> String {
     let Some((mass, bar)) = part.mass_kg.zip(part.half_width_95_kg) else { return part.part.clone() };
     if mass.abs() <= bar {
         return format!(
-            "{} differs from the robot description in its mass distribution; its mass differs by {} ± {} kg",
+            "{} differs from the robot description in centre of mass and inertia, and in mass by at most {} kg",
             part.part,
-            short(mass, 3),
-            short(bar, 2)
+            short(mass.abs() + bar, 2)
         );
     }
     let [verb, more] = if mass > 0.0 { ["carries", "more"] } else { ["has", "less"] };
@@ -59,7 +71,12 @@ fn change(part: &ChangedPart) -> String {
 
 fn alternative(explanation: &ChangeExplanation) -> String {
     let parts: Vec<&str> = explanation.parts.iter().map(|part| part.part.as_str()).collect();
-    format!("{} ({:.0} %)", parts.join(" and "), 100.0 * explanation.probability)
+    let named = match (explanation.everything, parts.is_empty()) {
+        (true, _) => "all bodies".to_owned(),
+        (false, true) => "no body".to_owned(),
+        (false, false) => parts.join(" and "),
+    };
+    format!("{named} ({:.0} %)", 100.0 * explanation.probability)
 }
 
 /// Edit test: torque error if the body gets the values of the description again.
@@ -67,8 +84,8 @@ fn edit_test(found: &DescriptionComparison, part: &ChangedPart) -> Option<String
     let body = found.bodies.iter().find(|body| part.part == format!("body `{}`", body.name))?;
     let (error, most) = body.error_percent.zip(body.error_95_percent)?;
     Some(format!(
-        "Edit test: if you set {} in the exported model back to the robot description, its torque error for such a robot is \
-         about {} %, at most {} % (95 %)",
+        "Edit test: if you give {} in the exported model the values of the robot description, the model predicts the \
+         torque of a robot with this original body to about {} %, at most {} % (95 %)",
         part.part,
         short(error, 2),
         short(most, 2)

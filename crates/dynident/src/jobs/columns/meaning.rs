@@ -117,14 +117,16 @@ const COMMANDED: [&str; 26] = [
     "interp",
     "d",
 ];
-/// Names without a quantity that are positions: a command alone, and the words of a LeRobot data set.
-const COMMANDED_POSITIONS: [&str; 10] =
-    ["cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action", "ctrl"];
+/// Names without a quantity that are positions: a command or an encoder alone, and the words of a LeRobot data set.
+const POSITIONS_ALONE: [&str; 13] = [
+    "cmd", "cmds", "command", "commands", "target", "targets", "goal", "goals", "action", "ctrl", "enc", "encoder",
+    "encoders",
+];
 /// Beginning of the columns of the commands in a SAGE recording.
 const SAGE_COMMANDS: &str = "control.";
-const MEASURED: [&str; 18] = [
+const MEASURED: [&str; 19] = [
     "actual", "act", "measured", "meas", "msr", "sensor", "sensed", "ist", "fb", "fbk", "feedback", "executed", "real",
-    "present", "encoder", "enc", "follow", "follower",
+    "present", "encoder", "encoders", "enc", "follow", "follower",
 ];
 const FILTERED: [&str; 7] = ["filtered", "filt", "flt", "smoothed", "smooth", "lowpass", "lpf"];
 const COMPUTED: [&str; 20] = [
@@ -244,8 +246,8 @@ pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     let by_word = by_words.into_iter().find(|(list, _)| has(list)).map(|(_, quantity)| quantity);
     let is_entry = joint.is_some() || named.is_some() || number.is_some();
     let of_entries = match &words[..] {
-        [word] if COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
-        [joint, word] if joint == "joint" && COMMANDED_POSITIONS.contains(&&word[..]) => Some(Quantity::Position),
+        [word] if POSITIONS_ALONE.contains(&&word[..]) => Some(Quantity::Position),
+        [joint, word] if joint == "joint" && POSITIONS_ALONE.contains(&&word[..]) => Some(Quantity::Position),
         [first, second] if first == "observation" && second == "state" => Some(Quantity::Position),
         [.., first, second] if first == "joint" && ["state", "states"].contains(&&second[..]) => {
             Some(Quantity::Position)
@@ -464,6 +466,8 @@ mod tests {
             ("cmd_2", Some(Position), Number(2), Source::Commanded, None),
             ("goal_position_3", Some(Position), Number(3), Source::Commanded, None),
             ("target[Other]", Some(Position), Name("other".to_owned()), Source::Commanded, None),
+            ("enc_Joint_1", Some(Position), Joint(3), Source::Measured, None),
+            ("encoder_2_rad", Some(Position), Number(2), Source::Measured, Some("rad")),
             ("cmd_2 [A]", None, Number(2), Source::Commanded, None),
             ("action[elbow.pos]", Some(Position), Name("elbow".to_owned()), Source::Commanded, None),
             ("action[2]", Some(Position), Number(2), Source::Commanded, None),

@@ -16,7 +16,7 @@ pub(super) fn basis(family: &Family, what: &str, alternatives: &str) -> String {
         Basis::ColumnNames => "by column names",
         Basis::Order => "by their order in the file",
         Basis::JointNames => "by the names of joints alone",
-        Basis::Assumption => "by their number alone",
+        Basis::Assumption => "assumed, because there is one for each joint",
     };
     let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
     format!("{}{what} {by}{unit}{alternatives}", source_name(family.source))
