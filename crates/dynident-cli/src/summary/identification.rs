@@ -246,7 +246,8 @@ fn between_logs(r: &ResultFile) -> String {
 /// The torque lag of the joints if it matters, otherwise a summary of it.
 fn lags(r: &ResultFile) -> String {
     let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
-    let text = r.method.torque_lag.sentence().map_or_else(String::new, |what| format!("\n  torque lag: {what}\n"));
+    let said = |what: String| format!("\n{}", wrapped(&format!("  torque lag: {what}"), 4));
+    let text = r.method.torque_lag.sentence().map_or_else(String::new, said);
     if r.method.torque_lag.kind != LagKind::Joints && known().all(|(_, lag)| !lag.matters) {
         return text;
     }

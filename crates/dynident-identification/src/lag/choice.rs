@@ -86,8 +86,8 @@ impl LagChoice {
         let [low, high] = [times_s().fold(f64::INFINITY, f64::min), times_s().fold(f64::NEG_INFINITY, f64::max)];
         (low <= high).then(|| {
             format!(
-                "friction changes its sign {:.1} to {:.1} ms after the filtered velocity (negative: before), as if joints \
-                 stick at reversals; the error bars include this",
+                "friction changes its sign {:.1} to {:.1} ms after the velocity (negative: before), as if joints stick at \
+                 reversals; the error bars include this",
                 1e3 * low,
                 1e3 * high
             )
