@@ -218,8 +218,8 @@ pub struct LagThresholds {
     /// common lag. 0.5 by default; unmodelled friction looks like a lag but explains less.
     pub min_own_share: f64,
     /// Limit on the χ² of the times between the zero of each joint's velocity and the change of sign of its friction,
-    /// in standard deviations above its mean. Above it these times are estimated with the lag. 4.0 by default: normal
-    /// errors of six joints exceed it in 3 of 1,000 studies.
+    /// in standard deviations above its mean. Above it these times are estimated with the lag. 2.0 by default: normal
+    /// errors of six joints exceed it in 4 of 100 studies.
     pub max_reversal_std: f64,
     /// Prior standard deviation of the lag of a drive or a bus, s, for an arm of usual size
     /// ([`CharacteristicScale`](dynident_model::CharacteristicScale)). 5 ms by default; the speed of drives and buses
@@ -236,7 +236,7 @@ impl Default for LagThresholds {
             min_parameter_shift: 0.3,
             max_scatter_std: 4.0,
             min_own_share: 0.5,
-            max_reversal_std: 4.0,
+            max_reversal_std: 2.0,
             prior_std_s: 5.0e-3,
             max_lag_s: LONGEST_DELAY_S,
         }

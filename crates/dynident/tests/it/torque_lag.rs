@@ -20,7 +20,7 @@ fn late_log(path: &Path, truth: &Truth, motion: &Motion, clock: (f64, f64), lags
 /// of [`late_log`].
 fn write_rows(
     path: &Path,
-    position: impl Fn(f64) -> Vec<f64>,
+    mut position: impl FnMut(f64) -> Vec<f64>,
     mut torque: impl FnMut(usize, f64) -> f64,
     clock: (f64, f64),
     lags_s: &[f64],
@@ -248,9 +248,12 @@ fn coverage_with_sticking_joints(lag_s: f64, runs: u64) -> (f64, f64) {
     let description = repository("examples/robots/paper_2r.toml");
     let truth = Truth::near(&description, 0.3, false);
     let more = "drive.coulomb = \"sign\"\nlog = [{ file = \"log.csv\" }]\nestimator.physical = false";
-    let job = Job::new(folder.path(), &study(&description.display().to_string(), 2, more));
+    // With the default filter of positions.
+    let text = study(&description.display().to_string(), 2, more)
+        .replace("differentiator = { method = \"central-differences\", order = 8 }", "");
+    let job = Job::new(folder.path(), &text);
     let expected = truth.base_values(&job.robot());
-    let mut random = Random(21);
+    let (mut random, mut of_encoder) = (Random(21), Random(22));
     let [mut lags, mut inside, mut intervals] = [0_usize; 3];
     for run in 0..runs {
         let motion = Sticking::new(Motion::new(2, 300 + run), 2, 30.0, 20.0e-3);
@@ -263,7 +266,8 @@ fn coverage_with_sticking_joints(lag_s: f64, runs: u64) -> (f64, f64) {
         };
         let noise = (0.1, &mut random);
         let path = folder.path().join("log.csv");
-        write_rows(&path, |t| motion.at(t).0[0].clone(), torque, (200.0, 30.0), &[lag_s; 2], noise);
+        let encoder = |t: f64| motion.at(t).0[0].iter().map(|q| q + 2.0e-5 * of_encoder.normal()).collect();
+        write_rows(&path, encoder, torque, (200.0, 30.0), &[lag_s; 2], noise);
         let result = job.identify().result;
         let common = result.method.torque_lag.common.unwrap();
         lags += usize::from((common.lag_s - lag_s).abs() <= common.half_width_95_s);
@@ -279,8 +283,8 @@ fn coverage_with_sticking_joints(lag_s: f64, runs: u64) -> (f64, f64) {
 fn joints_that_stick_at_reversals_do_not_look_like_a_lag() {
     for lag_s in [0.0, 4.0e-3] {
         let (lags, inside) = coverage_with_sticking_joints(lag_s, 20);
-        // 20 intervals of 95 %: fewer than 17 in 2 of 100 tests. 200 correlated intervals: 95 % within 3 %, two of
-        // these below.
-        assert!(lags >= 0.85 && inside >= 0.89, "{lag_s}: {lags}, {inside}");
+        // 20 intervals of 95 %: fewer than 17 in 2 of 100 tests. The model still lacks what the joints do at rest, so
+        // the share of the parameters is below 95 %; without the times of reversal it is 0.74, and 0.80 for the lags.
+        assert!(lags >= 0.85 && inside >= 0.80, "{lag_s}: {lags}, {inside}");
     }
 }
