@@ -240,7 +240,9 @@ fn between_logs(r: &ResultFile) -> String {
     if said.is_empty() {
         return String::new();
     }
-    wrapped(&format!("{}; the error bars include this", said.join(", ")), 2)
+    let is_of_bodies = found.bodies.is_some_and(|k| k >= MIN_REPORTED_RATIO);
+    let next = if is_of_bodies { "; `dynident check` names a log with another load" } else { "" };
+    wrapped(&format!("{}; the error bars include this{next}", said.join(", ")), 2)
 }
 
 /// The torque lag of the joints if it matters, otherwise a summary of it.

@@ -21,7 +21,7 @@ pub fn difference_words(r: &ResultFile) -> Vec<String> {
     if best.parts.is_empty() || few < MIN_REPORTED_PROBABILITY {
         return Vec::new();
     }
-    let is_certain = few >= MIN_CERTAIN_PROBABILITY;
+    let is_certain = best.probability >= MIN_CERTAIN_PROBABILITY;
     let changes: Vec<String> = best.parts.iter().map(change).collect();
     let perhaps = if is_certain { "" } else { "perhaps " };
     let mut words = vec![format!("{perhaps}{} (probability {:.0} %)", changes.join("; "), 100.0 * best.probability)];
