@@ -213,6 +213,7 @@ fn the_error_of_a_file_is_next_to_it() {
         }
         if class.is_some() {
             assert!(text.contains("Held-out torque error of this file: "), "{form}: {text}");
+            assert!(text.contains("Values of bodies measured from torque: "), "{form}: {text}");
         }
     }
     // Files with error bars have none.
