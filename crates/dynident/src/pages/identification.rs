@@ -39,11 +39,6 @@ pub fn identification_report(
     ));
     page.add(verdict(r));
     page.add(key_figures(r));
-    let differences = super::differences::difference_words(r);
-    if !differences.is_empty() {
-        let points = differences.into_iter().map(|words| (Tone::Warning, words)).collect();
-        page.add(Text { paragraphs: vec!["Differences from the robot description:".to_owned()], points });
-    }
     let first = first_plot(r, traces);
     if let Some(PlotPlace { trace, joint }) = first {
         let plot = torque_plot(r, &traces[trace], joint);
@@ -53,6 +48,11 @@ pub fn identification_report(
     }
     if let Some(robot) = robot {
         page.add(super::robot_colours::scene(robot, r, traces));
+    }
+    let differences = super::differences::difference_words(r);
+    if !differences.is_empty() {
+        let points = differences.into_iter().map(|words| (Tone::Warning, words)).collect();
+        page.add(Text { paragraphs: vec!["Differences from the robot description:".to_owned()], points });
     }
     if let Some(check) = &r.check {
         super::check::examination(&mut page, check, r.logs.len());
