@@ -150,12 +150,12 @@ pub fn grouped_check_findings(findings: &[CheckFinding], logs: Option<usize>) ->
         };
         let is_same = |other: &usize| of_log[*other].is_some() && combined(&[place, *other]).len() == 1;
         let same: Vec<usize> = (place..findings.len()).filter(is_same).collect();
-        match &combined(&same)[..] {
+        grouped.push(match &combined(&same)[..] {
             [group] if same.len() > 1 => {
-                grouped.push(CheckFinding { what: group.place(logs), evidence: group.message(), ..finding.clone() })
+                CheckFinding { what: group.place(logs), evidence: group.message(), ..finding.clone() }
             }
-            _ => grouped.push(finding.clone()),
-        }
+            _ => finding.clone(),
+        });
         done.extend(same);
     }
     grouped
@@ -240,7 +240,7 @@ mod tests {
         let all = [("one", found(5, "87.5")), ("one", found(6, "87.4")), ("two", found(5, "85.7"))];
         let checks: Vec<CheckFinding> = all.iter().map(|(log, found)| CheckFinding::about_log(log, found)).collect();
         let other = CheckFinding { what: "sign".to_owned(), kind: "sign".to_owned(), ..checks[0].clone() };
-        let mixed = [&checks[..1], &[other.clone()], &checks[1..]].concat();
+        let mixed = [&checks[..1], core::slice::from_ref(&other), &checks[1..]].concat();
         let grouped = grouped_check_findings(&mixed, Some(2));
         assert_eq!(grouped.len(), 2);
         assert_eq!(grouped[0].what, "torque arm_5, arm_6 (both logs)");

@@ -3,7 +3,9 @@
 use super::torque_words::{
     consistency_words, dead_torques, format_error_words, joint_error_words, percent_words, poorly_known_words,
 };
-use crate::result::{FormatError, JointError, POORLY_KNOWN_PERCENT, ResultFile, TorqueErrorSettings};
+use crate::result::{
+    BaseParameterResult, FormatError, JointError, POORLY_KNOWN_PERCENT, ResultFile, TorqueErrorSettings,
+};
 use dynident_report::{KeyFigures, Text, Tone, short};
 
 /// Maximum number of held-out logs in the first sentence and in the key figures.
@@ -205,7 +207,7 @@ pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
 /// How well the base parameters are known, with a rating.
 fn known_parameters(r: &ResultFile) -> (String, Tone) {
     let within = |percent: f64| {
-        let bars = r.base_parameters.iter().filter_map(|parameter| parameter.relative_half_width_percent());
+        let bars = r.base_parameters.iter().filter_map(BaseParameterResult::relative_half_width_percent);
         bars.filter(|bar| *bar <= percent).count()
     };
     let all = r.base_parameters.len();
