@@ -22,8 +22,9 @@ PATIENCE = 60.0
 # Exit status if the browser has crashed or hangs. It says nothing about the pages, so the caller may repeat the check.
 BROWSER_LOST = 75
 
-# A plot is visible if its static SVG or its canvas is not empty. Every section with a headline has an SVG or a canvas.
+# A plot is visible if its static SVG or its canvas is not empty. Every section with a headline has an SVG or a canvas. Folded plots are opened.
 UNSEEN = """(() => {
+  document.querySelectorAll("section.picture > details").forEach((fold) => { fold.open = true; });
   const shown = (element) => {
     const box = element.getBoundingClientRect();
     return box.width > 100 && box.height > 15 && getComputedStyle(element).visibility === "visible";

@@ -33,13 +33,12 @@ COLOURS = """
     .page { fill: #0d1117; stroke: #30363d } .ink { fill: #e6edf3 } .prompt { fill: #79c0ff } .left { fill: #9198a1 }
   }"""
 
-# Places of the upper part of the report, up to the picture of the robot, and of the held-out torque of the second joint.
+# Places of the upper part of the report, up to the first plot, and of the held-out torque of the second joint.
 REPORT = """(async () => {
   const place = (top, bottom) => ({ x: 0, y: scrollY + top - 4, width: innerWidth, height: bottom - top + 8, scale: 1 });
-  const stage = document.querySelector(".stage").getBoundingClientRect();
   const plots = [...document.querySelectorAll("section.plot")];
   const torque = plots.find((one) => one.querySelector("h3")?.textContent.startsWith("shoulder_lift_joint")).getBoundingClientRect();
-  return { report: place(4 - scrollY, stage.bottom), torque: place(torque.top, torque.bottom) };
+  return { report: place(4 - scrollY, plots[0].getBoundingClientRect().bottom), torque: place(torque.top, torque.bottom) };
 })()"""
 
 # The robot in the middle of its designed motion, with the limits of its joints.

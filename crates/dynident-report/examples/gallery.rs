@@ -106,6 +106,7 @@ fn robot() -> Scene {
     Scene {
         title: "A robot of four joints".into(),
         note: "the second link is heavier than described".into(),
+        is_low: false,
         words: "an upright arm".into(),
         joints: (1..=4).map(|k| format!("joint {k}")).collect(),
         posture: vec![0.0; 4],

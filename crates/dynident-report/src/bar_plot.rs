@@ -47,6 +47,8 @@ pub struct BarPlot {
     pub reference_label: String,
     /// The bars, from top to bottom.
     pub bars: Vec<Bar>,
+    /// Whether the plot is closed until the reader opens it.
+    pub is_folded: bool,
 }
 
 impl BarPlot {
@@ -58,7 +60,15 @@ impl BarPlot {
             label: label.into(),
             reference_label: String::new(),
             bars: Vec::new(),
+            is_folded: false,
         }
+    }
+
+    /// Closes the plot until the reader opens it.
+    #[must_use]
+    pub fn folded(mut self) -> Self {
+        self.is_folded = true;
+        self
     }
 
     /// Sets the note below the title.

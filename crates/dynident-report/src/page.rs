@@ -162,9 +162,9 @@ impl Section {
     }
 
     fn html(&self, number: usize, links: &BTreeMap<&str, String>) -> Result<String, ReportError> {
-        let picture = |title: &str, note: &str, svg: String, legend: &str| {
+        let picture = |title: &str, note: &str, svg: String, legend: &str, folded: bool| {
             let svg = Value::from_safe_string(svg);
-            rendered("picture.html", &context! { number, title, note, svg, legend })
+            rendered("picture.html", &context! { number, title, note, svg, legend, folded })
         };
         let plot = |title: &str, note: &str, joint: &str, data: String, picture: CurvePicture<'_>| {
             let data = Value::from_safe_string(data);
@@ -192,13 +192,15 @@ impl Section {
                 let axis = section.axis();
                 plot(&section.title, &section.note, "", section.data()?, section.picture(&axis))
             }
-            Self::BarPlot(section) => picture(&section.title, &section.note, section.svg()?, &section.reference_label),
-            Self::HeatMap(section) => picture(&section.title, &section.note, section.svg()?, ""),
-            Self::Diagram(section) => picture(&section.title, &section.note, section.picture(Place::Page)?, ""),
+            Self::BarPlot(section) => {
+                picture(&section.title, &section.note, section.svg()?, &section.reference_label, section.is_folded)
+            }
+            Self::HeatMap(section) => picture(&section.title, &section.note, section.svg()?, "", false),
+            Self::Diagram(section) => picture(&section.title, &section.note, section.picture(Place::Page)?, "", false),
             Self::Scene(scene) => {
                 let (data, svg) = (Value::from_safe_string(scene.data()?), Value::from_safe_string(scene.svg(false)?));
-                let Scene { title, note, words, .. } = scene;
-                rendered("scene.html", &context! { number, title, note, words, data, svg })
+                let Scene { title, note, words, is_low, .. } = scene;
+                rendered("scene.html", &context! { number, title, note, words, is_low, data, svg })
             }
         }
     }

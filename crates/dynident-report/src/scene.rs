@@ -146,6 +146,8 @@ pub struct Scene {
     pub title: String,
     /// Note below the title; may be empty.
     pub note: String,
+    /// Whether the picture is at most 300 px high instead of 460 px, with a closed list of bodies.
+    pub is_low: bool,
     /// Description for screen readers.
     pub words: String,
     /// Names of the joints.

@@ -2,7 +2,7 @@
 
 use core::fmt::Write;
 use dynident_identification::diagnosis::KeyChange;
-use dynident_recording::Level;
+use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of `check --json`.
@@ -10,6 +10,9 @@ pub const CHECK_SCHEMA: &str = "dynident/check/1";
 
 /// Share of unexplained torque above which most of a joint's torque is unexplained, percent.
 const MOST_PERCENT: f64 = 50.0;
+
+/// Kind of findings about single logs.
+const LOG_KIND: &str = "log";
 
 /// Result of `check`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -136,6 +139,27 @@ impl StudyChange {
 }
 
 impl CheckFinding {
+    /// Creates a finding about the log with the name `log`.
+    pub fn about_log(log: &str, finding: &Finding) -> Self {
+        Self {
+            level: finding.level,
+            kind: LOG_KIND.to_owned(),
+            what: format!("log `{log}`, {}", finding.channel),
+            evidence: finding.message.clone(),
+            write: Vec::new(),
+            or: Vec::new(),
+            code: finding.code.clone(),
+        }
+    }
+
+    /// Name of the log and its finding, for a finding that [`about_log`](Self::about_log) created.
+    pub fn of_log(&self) -> Option<(&str, Finding)> {
+        let named = self.what.strip_prefix("log `").filter(|_| self.kind == LOG_KIND)?;
+        let (log, channel) = named.rsplit_once("`, ")?;
+        let (level, message, code) = (self.level, self.evidence.clone(), self.code.clone());
+        Some((log, Finding { level, channel: channel.to_owned(), message, code }))
+    }
+
     /// Finding, evidence and corrections in one text.
     pub fn sentence(&self) -> String {
         let mut text = format!("{}: {}", self.what, self.evidence);

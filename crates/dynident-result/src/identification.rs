@@ -162,6 +162,10 @@ pub struct RobotSummary {
     pub dof: usize,
     /// Joint names in the order of all vectors.
     pub joints: Vec<String>,
+    /// Unit of each joint's torque, in the order of `joints`: `Nm`, or `N` for a prismatic joint. Empty in results of
+    /// older versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_units: Vec<String>,
     /// Gravity in the base frame, m/s².
     pub gravity_m_s2: [f64; 3],
     /// Order of the ten inertial parameters of a body.

@@ -13,12 +13,14 @@ mod export;
 mod export_validation;
 mod factors;
 mod forms;
+mod grouped;
 mod identification;
 mod inspection;
 mod iterations;
 mod log;
 mod new_study;
 mod numbers;
+mod poorly_known;
 mod problems;
 mod provenance;
 mod read;
@@ -30,6 +32,7 @@ mod simulation;
 mod sound;
 mod stored;
 mod test_samples;
+mod torque_errors;
 mod validation;
 
 pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, HypothesisResult, StudyChange, StudyCheck};
@@ -47,6 +50,7 @@ pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use export_validation::{EXPORT_VALIDATION_SCHEMA, ExportValidationFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
 pub use forms::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
+pub use grouped::{FindingGroup, grouped_check_findings, grouped_findings};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
@@ -60,6 +64,7 @@ pub use iterations::{
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
+pub use poorly_known::{POORLY_KNOWN_PERCENT, ParameterKind, PoorlyKnown};
 pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use read::{MAX_RESULT_BYTES, read_result};
@@ -68,6 +73,7 @@ pub use servo_design::{SERVO_DESIGN_SCHEMA, ServoDesignFile, ServoForecast, Serv
 pub use servo_form::{ServoForm, ServoFormLog};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
+pub use torque_errors::{FormatError, JointError, TorqueErrorSettings};
 // Types of lower crates in these files.
 pub use dynident_excitation::check::LimitReport;
 pub use dynident_identification::ErrorSource;

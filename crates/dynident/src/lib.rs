@@ -114,6 +114,9 @@ pub use pages::figures::{Figure, FigureForm};
 pub use pages::identification::identification_report;
 pub use pages::robot::RobotAppearance;
 pub use pages::servo::verdict_words;
+pub use pages::torque_words::{
+    consistency_words, dead_torques, format_error_words, joint_error_words, poorly_known_words,
+};
 pub use result::{
     CheckFile, DesignFile, Inspection, IterationsFile, LogContents, MAX_RESULT_BYTES, ResultFile, ResultFileError,
     SimulationFile, ValidationFile, read_result,

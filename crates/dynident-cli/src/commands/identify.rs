@@ -108,7 +108,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &out, &models))?;
     }
-    show_problems(&result.problems, ", listed in result.json");
+    show_problems(&result.problem_lines(), ", listed in result.json");
     let within = judged(&result.validation, options.max_validation_error);
     Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }

@@ -1,7 +1,7 @@
 use super::text::{explained, name, table, wrapped};
 use dynident::CheckFile;
 use dynident::recording::Level;
-use dynident::result::StudyCheck;
+use dynident::result::{StudyCheck, grouped_check_findings};
 
 /// Largest percentage of unexplained torque that is printed as a number; a larger one only means that no fit was
 /// found.
@@ -14,7 +14,7 @@ pub(crate) fn check(file: &CheckFile) -> String {
     if problems == 0 {
         text += &wrapped(&verdict(check), 2);
     }
-    for finding in &check.findings {
+    for finding in grouped_check_findings(&check.findings, None) {
         let level = if finding.level == Level::Problem { "PROBLEM" } else { "warning" };
         text += &wrapped(&format!("{level} {}", finding.what), 2);
         text += &wrapped(&format!("  {}", finding.evidence), 4);

@@ -1,13 +1,13 @@
 use super::findings::{problems, warnings};
 use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
-use super::validation::{residuals, written};
+use super::validation::residuals;
 use core::fmt::Write;
 use dynident::ResultFile;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::{LagKind, LogValidation};
 use dynident::identification::friction::FrictionCandidate;
-use dynident::result::{BaseParameterResult, LogSummary};
+use dynident::result::{BaseParameterResult, LogSummary, POORLY_KNOWN_PERCENT, TorqueErrorSettings};
 use std::path::Path;
 
 /// Maximum number of base parameters shown; the file contains all.
@@ -109,7 +109,7 @@ fn headline(r: &ResultFile) -> String {
     for (number, log) in r.validation.iter().enumerate() {
         let prior =
             prior_of(log, None).map_or(String::new(), |p| format!("; robot description {}\u{a0}%", percent(Some(p))));
-        let error = percent(written(log).relative_error_percent);
+        let error = percent(log.exported().relative_error_percent);
         let without = without_events(log);
         text += &wrapped(
             &format!(
@@ -121,6 +121,7 @@ fn headline(r: &ResultFile) -> String {
             2,
         );
     }
+    text += &weak_joints(r);
     text += &bands(r);
     text += &beside(r);
     text + &super::forms::forms(r)
@@ -145,40 +146,43 @@ fn without_events(log: &LogValidation) -> String {
     )
 }
 
-/// The frequency bands of fit and validation, if they differ.
+/// The joints with much larger errors than all joints together.
+fn weak_joints(r: &ResultFile) -> String {
+    let weak = r.weak_joints(&TorqueErrorSettings::default());
+    if weak.is_empty() {
+        return String::new();
+    }
+    wrapped(&format!("much worse at single joints: {}", dynident::joint_error_words(&weak, &name)), 2)
+}
+
+/// The frequency bands of fit and validation, and the error without a filter.
 fn bands(r: &ResultFile) -> String {
-    let in_force = r.method.motion.differentiator.cutoff_hz();
-    let (Some(motion_hz), Some(cutoff_hz)) = (r.method.motion_hz, in_force) else { return String::new() };
-    wrapped(
-        &format!(
-            "positions filtered at {cutoff_hz:.1}\u{a0}Hz; held-out errors: torque below {:.1}\u{a0}Hz, the band of the motion",
-            0.7 * motion_hz
-        ),
-        2,
-    )
+    let band = r.validation.first().and_then(|log| Some((log, r.held_out_band_hz(log)?)));
+    let Some((log, band_hz)) = band else { return String::new() };
+    let in_force = r.method.motion.differentiator.cutoff_hz().filter(|_| r.method.motion_hz.is_some());
+    let positions =
+        in_force.map_or_else(String::new, |cutoff_hz| format!("positions filtered at {cutoff_hz:.1}\u{a0}Hz; "));
+    let raw = log.exported_raw().map_or_else(String::new, |raw| {
+        format!("; without this filter {}\u{a0}%", percent(raw.relative_error_percent))
+    });
+    wrapped(&format!("{positions}held-out errors: torque filtered below {band_hz:.1}\u{a0}Hz{raw}"), 2)
 }
 
 /// The unconstrained estimate compared with the physically consistent model that is written, and whether they differ
 /// significantly.
 fn beside(r: &ResultFile) -> String {
-    let Some(fit) = &r.physical.fit else { return String::new() };
+    if r.physical.fit.is_none() {
+        return String::new();
+    }
     let free = |log: &LogValidation| format!("{}\u{a0}%", percent(log.model.relative_error_percent));
     let mut errors: Vec<String> = r.validation.iter().take(MAX_LOG_COLUMNS).map(free).collect();
     if errors.is_empty() {
         errors.push(format!("{}\u{a0}%", percent(r.training.relative_error_percent)));
     }
-    let verdict = match fit.difference {
-        Some(test) if test.is_significant => format!(
-            ", significantly better (p\u{a0}=\u{a0}{:.1e}): no physically consistent model explains these logs \
-             completely",
-            test.p_value
-        ),
-        Some(test) => format!(", not significantly better (p\u{a0}=\u{a0}{:.2})", test.p_value),
-        None => String::new(),
-    };
+    let verdict = dynident::consistency_words(r).map_or_else(String::new, |words| format!("; {words}"));
     wrapped(
         &format!(
-            "  these errors are those of the written, physically consistent model; the unconstrained fit has {}{verdict}",
+            "  errors of the exported, physically consistent model{verdict}; unconstrained estimate: {}",
             errors.join(", ")
         ),
         4,
@@ -209,7 +213,7 @@ fn joints(r: &ResultFile) -> String {
             joint.map_or(("all joints", all), |j| (&joints[j].name[..], joints[j].relative_error_percent));
         let mut row = vec![name(title), percent(fit)];
         for log in logs {
-            let written = written(log);
+            let written = log.exported();
             let (relative, rms) = joint.map_or((written.relative_error_percent, written.rmse_nm), |j| {
                 let joint = &written.joints[j];
                 (joint.relative_error_percent, joint.rmse_nm)
@@ -318,22 +322,7 @@ fn parameters(r: &ResultFile) -> String {
     });
     let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
     text += &table(&header, 0..2, rows.collect());
-    let vague: Vec<&str> = order
-        .iter()
-        .rev()
-        .filter(|index| error(**index) > 100.0)
-        .map(|&index| &r.base_parameters[index].symbol[..])
-        .collect();
-    if !vague.is_empty() {
-        text += &wrapped(
-            &format!(
-                "{} parameters are poorly determined (error bar larger than the value), worst first: {}; use a more exciting motion (`dynident design`)",
-                vague.len(),
-                listed(&vague, MAX_SHOWN)
-            ),
-            2,
-        );
-    }
+    text += &poorly_known(r);
     for sentence in &r.method.coincident {
         text += &wrapped(sentence, 2);
     }
@@ -344,6 +333,29 @@ fn parameters(r: &ResultFile) -> String {
         text += &conditional(r);
     }
     text
+}
+
+/// Kinds, links and joints of the poorly known parameters, whether they matter, and what to do.
+fn poorly_known(r: &ResultFile) -> String {
+    let found = r.poorly_known();
+    if found.is_empty() {
+        return String::new();
+    }
+    let dead = dynident::dead_torques(r);
+    let advice = if dead.is_empty() {
+        "`dynident design` finds a motion that measures them".to_owned()
+    } else {
+        let joints: Vec<String> = dead.iter().map(|joint| name(joint)).collect();
+        format!("first find out why the torque of {} is zero", joints.join(", "))
+    };
+    wrapped(
+        &format!(
+            "poorly known (error bar above {POORLY_KNOWN_PERCENT}\u{a0}%): {}; motion like the recorded one hardly needs \
+             them, other motion and payloads do: {advice}",
+            dynident::poorly_known_words(&found)
+        ),
+        2,
+    )
 }
 
 /// Estimates that depend on parameters that were fixed at the prior, and how to determine these parameters.
@@ -414,7 +426,7 @@ fn masses(intervals: &[ParameterInterval]) -> String {
 fn data(log: &LogSummary) -> String {
     let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
     format!(
-        "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered",
+        "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered rows per joint",
         log.log,
         log.role.name(),
         log.import.rows,

@@ -17,7 +17,7 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
         let headline = format!(
             "{}: torque error {} % ({free}robot description {} %), {} samples",
             log.log,
-            percent(written(log).relative_error_percent),
+            percent(log.exported().relative_error_percent),
             percent(log.prior.as_ref().and_then(|prior| prior.relative_error_percent)),
             log.model.samples
         );
@@ -104,16 +104,11 @@ fn at_rest(log: &LogValidation) -> String {
     }
 }
 
-/// Validation of the written model: of the physically consistent one if available, otherwise of the estimate.
-pub(super) fn written(log: &LogValidation) -> &ValidationReport {
-    log.physical.as_ref().unwrap_or(&log.model)
-}
-
 fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {
     let relative = |report: &ValidationReport| {
         joint.map_or(report.relative_error_percent, |j| report.joints[j].relative_error_percent)
     };
-    let own = written(log);
+    let own = log.exported();
     let (rms, max, r_squared) = joint.map_or((own.rmse_nm, own.max_error_nm, own.r_squared), |j| {
         let joint = &own.joints[j];
         (joint.rmse_nm, joint.max_error_nm, joint.r_squared)

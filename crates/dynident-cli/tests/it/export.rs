@@ -213,6 +213,9 @@ fn the_error_of_a_file_is_next_to_it() {
         }
         if class.is_some() {
             assert!(text.contains("Held-out torque error of this file: "), "{form}: {text}");
+            // The URDF of `identify` states the sources at each link.
+            let sources = ["Values of bodies measured from torque: ", "in the link's frame, identified: "];
+            assert!(sources.iter().any(|words| text.contains(words)), "{form}: {text}");
         }
     }
     // Files with error bars have none.

@@ -66,6 +66,97 @@ fn a_data_folder_that_is_none_is_an_error() {
     assert!(ran.stderr.contains("/nonexistent"), "{}", ran.stderr);
 }
 
+/// Noise on the torque of one joint: page and terminal name this joint, with the error of `result.json`, and the page
+/// states what the model is for.
+#[test]
+fn a_joint_with_much_larger_errors_is_named() {
+    let out = tempfile::tempdir().unwrap();
+    let examples = repository("examples/ur10_simulated");
+    for name in ["train.csv", "test.csv"] {
+        let text = std::fs::read_to_string(examples.join(name)).unwrap();
+        let (header, rows) = text.split_once('\n').unwrap();
+        let column = header.split(',').position(|column| column == "tau6_Nm").unwrap();
+        let mut changed = header.to_owned();
+        for (number, row) in rows.lines().enumerate() {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            let disturbed = cells[column].parse::<f64>().unwrap() + 4.0 * (0.037 * number as f64).sin();
+            cells[column] = disturbed.to_string();
+            changed = changed + "\n" + &cells.join(",");
+        }
+        std::fs::write(out.path().join(name), changed + "\n").unwrap();
+    }
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let study = study.replace("../robots", &repository("robots").display().to_string()).replace("ur10_simulated/", "");
+    std::fs::write(out.path().join("study.toml"), study).unwrap();
+    let ran = run_in(out.path(), &["identify", "study.toml", "--out", "found"]);
+    let read = |name: &str| std::fs::read_to_string(out.path().join("found").join(name)).unwrap();
+    let result: serde_json::Value = serde_json::from_str(&read("result.json")).unwrap();
+    let errors = &result["validation"][0]["physical"];
+    let percent = |value: &serde_json::Value| value["relative_error_percent"].as_f64().unwrap();
+    let weak: Vec<&str> = errors["joints"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|joint| percent(joint) >= 20.0 && percent(joint) >= 2.0 * percent(errors))
+        .map(|joint| joint["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(weak, ["wrist_3_joint"], "{errors}");
+    let words = format!("wrist_3_joint {:.1}\u{a0}%", percent(&errors["joints"][5]));
+    let page = read("report.html");
+    let at = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what} is not on the page"));
+    assert!(at(&format!("Much worse at single joints: {words}")) < at("class=\"key-figures\""));
+    assert!(ran.stdout.contains("much worse at single joints: wrist_3_joint"), "{}", ran.stdout);
+    // The URDF lacks drive inertia and offsets.
+    assert!(at("terms are worse: URDF, SDF") < at("class=\"key-figures\""));
+    // Symbols of the inertia of links: Ixx1 .. Izz6; Ia1 is the inertia of a drive.
+    let symbols = result["base_parameters"].as_array().unwrap().iter().map(|own| own["symbol"].as_str().unwrap());
+    let inertia = symbols.filter(|symbol| symbol.starts_with('I') && !symbol.starts_with("Ia")).count();
+    assert!(
+        page.contains(&format!("inertia all {inertia}")) || page.contains(&format!(" of {inertia} (")),
+        "{inertia}"
+    );
+}
+
+/// At rest the unfiltered error of the exported model is that of gravity and offsets.
+#[test]
+fn the_unfiltered_error_is_that_of_the_exported_model() {
+    let out = tempfile::tempdir().unwrap();
+    let train = repository("examples/ur10_simulated/train.csv");
+    let (posture, torque) = ([0.3, -1.0, 1.2, -0.4, 0.8, 0.1], [1.0, -60.0, -30.0, 2.0, 1.5, 0.5]);
+    let header = std::fs::read_to_string(&train).unwrap().lines().next().unwrap().to_owned();
+    let mut text = header.clone() + "\n";
+    for row in 0..1500 {
+        let cell = |column: &str| {
+            let number = |rest: &str| rest.chars().next().unwrap().to_digit(10).unwrap() as usize - 1;
+            match column {
+                "t_s" => f64::from(row) * 0.008,
+                q if q.starts_with('q') => posture[number(&q[1..])],
+                tau if tau.starts_with("tau") => torque[number(&tau[3..])],
+                _ => 0.0,
+            }
+            .to_string()
+        };
+        text += &(header.split(',').map(cell).collect::<Vec<_>>().join(",") + "\n");
+    }
+    let rest = out.path().join("rest.csv");
+    std::fs::write(&rest, text).unwrap();
+    identify(out.path(), "ur10_simulated/test.csv", &rest.display().to_string(), &[]);
+    let found = out.path().join("found");
+    let result: serde_json::Value = serde_json::from_slice(&std::fs::read(found.join("result.json")).unwrap()).unwrap();
+    let robot = dynident::load_robot(&found.join("identified.urdf"), &dynident::LoadSettings::default()).unwrap();
+    let mut workspace = dynident::dynamics::Workspace::new(&robot.model);
+    let gravity = dynident::dynamics::inverse_dynamics(&robot.model, &mut workspace, &posture, &[0.0; 6], &[0.0; 6]);
+    for joint in 0..6 {
+        let laws = result["joints"][joint]["laws"].as_array().unwrap();
+        let offsets = laws.iter().filter(|law| law["symbol"].as_str().unwrap().starts_with("off"));
+        let offset: f64 = offsets.map(|law| law["value"].as_f64().unwrap()).sum();
+        let expected = (torque[joint] - gravity[joint] - offset).abs();
+        let found = result["validation"][0]["raw_physical"]["joints"][joint]["rmse_nm"].as_f64().unwrap();
+        // Numbers of a URDF have full precision; velocities of constant positions are rounding errors.
+        assert!((found - expected).abs() < 1e-6 * (1.0 + expected), "joint {joint}: {found}, expected {expected}");
+    }
+}
+
 fn outputs(folder: &Path) -> Vec<Vec<u8>> {
     let names = ["found/result.json", "found/report.html", "found/identified.urdf"];
     names.iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect()

@@ -31,6 +31,9 @@ pub struct LogValidation {
     pub in_fit_band: Option<ValidationReport>,
     /// Errors for the torque as logged, without a filter.
     pub raw: ValidationReport,
+    /// Errors of the physically consistent set for the torque as logged; missing in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raw_physical: Option<ValidationReport>,
     /// Errors of the physically consistent set for the same torque as `model`.
     pub physical: Option<ValidationReport>,
     /// Errors of the robot description for the same torque as `model`.
@@ -44,6 +47,18 @@ pub struct LogValidation {
     /// Errors without the intervals of clear events; missing without such events.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub without_events: Option<WithoutEvents>,
+}
+
+impl LogValidation {
+    /// Errors of the exported model: of the physically consistent set, or of the estimate if there is no such set.
+    pub fn exported(&self) -> &ValidationReport {
+        self.physical.as_ref().unwrap_or(&self.model)
+    }
+
+    /// Errors of the exported model for the torque as logged, without a filter; `None` in results of older versions.
+    pub fn exported_raw(&self) -> Option<&ValidationReport> {
+        if self.physical.is_some() { self.raw_physical.as_ref() } else { Some(&self.raw) }
+    }
 }
 
 /// Errors on a held-out recording without the intervals of clear events.
@@ -85,6 +100,7 @@ struct HeldOutTest<'a> {
     model: Validation,
     physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
+    raw_physical: Option<(&'a [f64], Validation)>,
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
     /// Agreement with the nominal values for each joint; `None` without nominal values.
@@ -153,15 +169,20 @@ impl RowConsumer for HeldOutTest<'_> {
         for joint in 0..self.rows_of.model().dof() {
             let columns = self.rows_of.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
-            predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
             // Rows with extrapolated motion or rejected torque are excluded.
             let measured = &panel[columns.len() * rows..];
             let set_aside = samples.set_aside.get(joint);
             let counts = |row: &usize| set_aside.is_none_or(|set_aside| !set_aside[*row]);
-            let kept = samples.settled.clone().filter(counts);
-            let (measured, predicted): (Vec<f64>, Vec<f64>) = kept.map(|row| (measured[row], self.buffer[row])).unzip();
-            let added = self.raw.add_joint(joint, &measured, &predicted);
-            added.map_err(|source| self.failed(source))?;
+            let estimate = core::iter::once((self.theta, &mut self.raw));
+            let physical = self.raw_physical.iter_mut().map(|(theta, raw)| (*theta, raw));
+            for (theta, raw) in estimate.chain(physical) {
+                predicted_torque(panel, rows, columns, theta, &mut self.buffer);
+                let kept = samples.settled.clone().filter(counts);
+                let (measured, predicted): (Vec<f64>, Vec<f64>) =
+                    kept.map(|row| (measured[row], self.buffer[row])).unzip();
+                let added = raw.add_joint(joint, &measured, &predicted);
+                added.map_err(|source| LogError::Rows { log: self.log.clone(), source })?;
+            }
         }
         if let Some(band) = &mut self.motion_band {
             band.raw(&self.log, samples)?;
@@ -236,6 +257,7 @@ pub(crate) fn tested_on(
         model: Validation::new(joints.clone()),
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
+        raw_physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
         agreement: nominal
             .map(|nominal| (0..model.dof()).map(|joint| AgreementAccumulator::new(model, joint, nominal)).collect()),
@@ -269,6 +291,7 @@ pub(crate) fn tested_on(
             model: tested_model,
             in_fit_band,
             raw: test.raw.report(),
+            raw_physical: test.raw_physical.map(|(_, set)| set.report()),
             physical: tested_physical,
             prior: tested_prior,
             residuals,

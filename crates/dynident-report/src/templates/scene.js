@@ -200,9 +200,11 @@
     const state = { motion: 0, time: 0, playing: false, rate: 1, ghost: false, ellipsoids: false, colouring: 0, body: null, q: data.posture };
 
     let waiting = false;
+    const isLow = Boolean(holder.closest(".low"));
+    const [lowest, highest] = isLow ? [220, 300] : [280, 460];
     const render = () => {
       waiting = false;
-      const [width, height] = [holder.clientWidth, Math.round(Math.min(460, Math.max(280, holder.clientWidth * 0.55)))];
+      const [width, height] = [holder.clientWidth, Math.round(Math.min(highest, Math.max(lowest, holder.clientWidth * 0.55)))];
       if (renderer.width !== width || renderer.height !== height) {
         renderer.setSize(width, height);
         camera.perspective({ aspect: width / height });
@@ -511,7 +513,7 @@
 
     holder.append(bar, stage, legend);
     if (data.motions.length) holder.append(film, gauges);
-    holder.append(element("details", { open: data.bodies.length <= 9 }, element("summary", {}, "Bodies"), list));
+    holder.append(element("details", { open: !isLow && data.bodies.length <= 9 }, element("summary", {}, "Bodies"), list));
     holder.classList.add("live");
     paint();
     // For tests: poses of the bodies at positions of the joints.

@@ -216,3 +216,18 @@ fn every_plot_is_a_picture_with_words_before_any_script_runs() {
     }
     assert!(page.contains("name: 1 to 2"), "ranges of the curves in words");
 }
+
+/// A folded plot is closed but complete, and its title stays visible in print.
+#[test]
+fn a_folded_plot_is_closed_and_has_its_title() {
+    let plot = BarPlot::new("other fit", "%").note("why it differs").bar("elbow", 3.0, None, None);
+    let page_with = |plot: BarPlot| {
+        let mut report = Report::new("folded");
+        report.add(plot);
+        report.html().unwrap()
+    };
+    let (open, folded) = (page_with(plot.clone()), page_with(plot.folded()));
+    assert!(!open.contains("<details>") && open.contains("<h3>other fit</h3>"));
+    assert!(folded.contains("<details><summary><h3>other fit</h3></summary>"));
+    assert!(folded.contains("why it differs") && folded.matches("</details>").count() == 1);
+}

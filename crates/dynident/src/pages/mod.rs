@@ -21,6 +21,7 @@ mod run_figures;
 pub(crate) mod run_trace;
 pub(crate) mod servo;
 mod torque_check;
+pub(crate) mod torque_words;
 mod verdict;
 pub(crate) mod view;
 

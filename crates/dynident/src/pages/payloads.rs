@@ -23,7 +23,8 @@ pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
                 gain.reason.clone().unwrap_or_default().into(),
             ]
         });
-        let columns = ["joint", "Nm (N) per logged unit", "std", "95 %, ±", "reason if not identified"];
+        let unit = format!("{} per logged unit", r.common_torque_unit());
+        let columns = ["joint", &unit[..], "std", "95 %, ±", "reason if not identified"];
         page.add(Table::new("Drive gains", columns).note("factors for torque.scale of the log's format").rows(rows));
     }
     if !r.offsets.is_empty() {
@@ -35,7 +36,8 @@ pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
                 short(offset.std_nm, 3).into(),
             ]
         });
-        let table = Table::new("Offsets by log", ["joint", "log", "deviation from the mean, Nm (N)", "std"]);
+        let deviation = format!("deviation from the mean, {}", r.common_torque_unit());
+        let table = Table::new("Offsets by log", ["joint", "log", &deviation[..], "std"]);
         page.add(table.note("the base parameters contain the mean over the training logs").rows(rows));
     }
 }

@@ -22,6 +22,7 @@ const MOST_VALUES: usize = 5;
 /// the logs.
 pub(super) fn scene(robot: &RobotAppearance, r: &ResultFile, traces: &[LogTrace]) -> Scene {
     let mut scene = robot.scene("The robot");
+    scene.is_low = true;
     let of = |name: &str| r.bodies.iter().find(|body| body.name == name);
     let bodies: Vec<Option<&BodyResult>> = scene.bodies.iter().map(|body| of(&body.name)).collect();
     for (body, result) in scene.bodies.iter_mut().zip(&bodies).skip(1) {
@@ -32,7 +33,7 @@ pub(super) fn scene(robot: &RobotAppearance, r: &ResultFile, traces: &[LogTrace]
     scene.colourings = vec![known(&bodies), changed(&bodies)];
     scene.colourings.extend(r.description_differences.as_ref().map(|found| differing(&bodies, found)));
     for trace in traces.iter().rev().filter(|trace| trace.motion.times_s.len() > 1) {
-        scene.motions.push(motion(trace));
+        scene.motions.push(motion(trace, r.common_torque_unit()));
     }
     if !scene.motions.is_empty() {
         scene.colourings.push(Colouring {
@@ -145,7 +146,7 @@ fn changed(bodies: &[Option<&BodyResult>]) -> Colouring {
 
 /// The motion of a log with torque and torque error. The colour range of the error is the root mean square of the
 /// torque.
-fn motion(trace: &LogTrace) -> SceneMotion {
+fn motion(trace: &LogTrace, unit: &str) -> SceneMotion {
     let (measured, predicted) = (&trace.motion.measured_nm, &trace.motion.predicted_nm);
     let error = |(measured, predicted): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         measured.iter().zip(predicted).map(|(measured, predicted)| measured - predicted).collect()
@@ -162,8 +163,8 @@ fn motion(trace: &LogTrace) -> SceneMotion {
         times_s: trace.motion.times_s.clone(),
         q: trace.motion.q.clone(),
         gauges: vec![
-            Gauge { name: "torque, Nm (N)".into(), values: measured.clone(), limits: vec![None; measured.len()] },
-            Gauge { name: "torque error, Nm (N)".into(), values: errors, limits: measured.iter().map(rms).collect() },
+            Gauge { name: format!("torque, {unit}"), values: measured.clone(), limits: vec![None; measured.len()] },
+            Gauge { name: format!("torque error, {unit}"), values: errors, limits: measured.iter().map(rms).collect() },
         ],
         ..SceneMotion::default()
     }

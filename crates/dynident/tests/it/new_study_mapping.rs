@@ -225,6 +225,26 @@ fn measured_quantities_come_before_commanded_and_computed_ones() {
     );
 }
 
+/// The columns of the study in a second log are no alternative to them.
+#[test]
+fn equal_columns_of_two_logs_are_no_alternatives() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = robot(folder.path(), ["base", "elbow"]);
+    let columns = [
+        ("stamp_s", 0, 1.0),
+        ("enc_base_rad", 1, 1.0),
+        ("enc_elbow_rad", 2, 1.0),
+        ("trq_base_Nm", 3, 1.0),
+        ("trq_elbow_Nm", 4, 1.0),
+    ];
+    let first = csv(folder.path(), &columns);
+    let second = folder.path().join("second.csv");
+    std::fs::copy(&first, &second).unwrap();
+    let (found, study) = written_of(&robot, &[first, second]).unwrap();
+    assert!(found.text.contains("enc_base_rad") && study.log.len() == 2, "{}", found.text);
+    assert!(!found.text.contains("not used"), "{}", found.text);
+}
+
 #[test]
 fn columns_without_names_are_assigned_in_order() {
     let folder = tempfile::tempdir().unwrap();

@@ -56,4 +56,11 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");
     }
     assert!(page.contains("steps longer than three median steps"), "findings about the log");
+    // Both joints are revolute.
+    assert!(page.contains("torque, Nm") && !page.contains("Nm (N)"), "unit of the joints");
+    // The plot of the joint with the largest torque is before all tables, the other plots are behind them.
+    let at = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what} is not on the page"));
+    assert!(
+        at("joint with the largest torque") < at("<table>") && at("<table>") < page.rfind("data-plot=\"plot-").unwrap()
+    );
 }

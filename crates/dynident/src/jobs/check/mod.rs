@@ -83,7 +83,9 @@ pub fn check_with(
     }
     for RecordingEvents { index, search } in &examined.events {
         let log = study.log_name(*index);
-        check.findings.extend(event_findings(search, &log).iter().map(|finding| log_finding(&log, finding)));
+        check
+            .findings
+            .extend(event_findings(search, &log).iter().map(|finding| CheckFinding::about_log(&log, finding)));
     }
     // A dead channel distorts the test of the robot description, and every test that needs its torque.
     if check.findings.iter().any(|finding| finding.kind == "log" && finding.level == Level::Problem) {
@@ -216,19 +218,7 @@ fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
     let key = every.map(|every| StudyChange { table: "format".to_owned(), line: format!("keep_every = {every}") });
     let found = |finding: &dynident_recording::Finding| CheckFinding {
         write: key.iter().filter(|_| finding.code == REPEATED_VALUES).cloned().collect(),
-        ..log_finding(log, finding)
+        ..CheckFinding::about_log(log, finding)
     };
     matters.map(found).collect()
-}
-
-fn log_finding(log: &str, finding: &dynident_recording::Finding) -> CheckFinding {
-    CheckFinding {
-        level: finding.level,
-        kind: "log".to_owned(),
-        what: format!("log `{log}`, {}", finding.channel),
-        evidence: finding.message.clone(),
-        write: Vec::new(),
-        or: Vec::new(),
-        code: finding.code.clone(),
-    }
 }

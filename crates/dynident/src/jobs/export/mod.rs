@@ -13,7 +13,7 @@ pub use validation::{
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::jobs::violations::violations;
-use crate::result::{FormResult, ResultFile};
+use crate::result::{FormResult, ResultFile, ValueSource};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{
     CodeOptions, ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export_with,
@@ -160,7 +160,37 @@ fn reservations(stored: &ResultFile) -> Vec<String> {
         let names: Vec<&str> = stored.payloads.iter().map(|payload| payload.name.as_str()).collect();
         notes.push(format!("The arm without its payloads ({}).", names.join(", ")));
     }
+    notes.extend(value_sources(stored));
     notes
+}
+
+/// Which values of the bodies were measured, and which only in sums; `None` for a result of an earlier version.
+fn value_sources(stored: &ResultFile) -> Option<String> {
+    let sources: Vec<_> = stored.bodies.iter().map(|body| Some((body, body.sources?))).collect::<Option<_>>()?;
+    let with = |wanted: ValueSource| {
+        // Bodies with the same values are listed together.
+        let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
+        for (body, sources) in &sources {
+            let names = stored.robot.parameter_order.iter().zip(sources);
+            let own: Vec<&str> =
+                names.filter(|(_, source)| **source == wanted).map(|(name, _)| name.as_str()).collect();
+            let own = own.join(" ");
+            match groups.iter_mut().find(|(values, _)| *values == own) {
+                _ if own.is_empty() => {}
+                Some((_, bodies)) => bodies.push(&body.name),
+                None => groups.push((own, vec![&body.name])),
+            }
+        }
+        let all: Vec<String> =
+            groups.iter().map(|(values, bodies)| format!("{values} of {}", bodies.join(", "))).collect();
+        if all.is_empty() { "none".to_owned() } else { all.join("; ") }
+    };
+    Some(format!(
+        "Values of bodies measured from torque: {}. Measured only in sums with other values: {}. All other values are near \
+         the robot description.",
+        with(ValueSource::Measured),
+        with(ValueSource::Partly)
+    ))
 }
 
 fn robot_model(

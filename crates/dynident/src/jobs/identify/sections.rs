@@ -18,7 +18,7 @@ use dynident_identification::{
     ConditionalEstimate, ErrorSource, Identification, Recording, RegressorModel, resting_joints,
 };
 use dynident_model::terms::{StateFunction, TorqueTerm};
-use dynident_model::{INERTIAL_NAMES, InertialParameters};
+use dynident_model::{INERTIAL_NAMES, InertialParameters, JointKind};
 
 pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
     RobotSummary {
@@ -26,8 +26,16 @@ pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
         file: robot.robot.path.display().to_string(),
         dof: robot.model().dof(),
         joints: robot.parametric.joint_names(),
+        torque_units: robot.model().joints().iter().map(|joint| torque_unit(joint.kind).to_owned()).collect(),
         gravity_m_s2: robot.model().gravity().0,
         parameter_order: INERTIAL_NAMES.map(str::to_owned),
+    }
+}
+
+fn torque_unit(joint: JointKind) -> &'static str {
+    match joint {
+        JointKind::Revolute | JointKind::Continuous => "Nm",
+        JointKind::Prismatic => "N",
     }
 }
 

@@ -32,12 +32,14 @@ fn source_name(source: Source) -> &'static str {
     }
 }
 
-/// The columns that could be used instead of `chosen`, as the end of a reason.
+/// The columns that could be used instead of `chosen`, as the end of a reason. The same columns of another recording
+/// are no alternative.
 pub(super) fn alternatives<'a>(chosen: &Family, all: impl Iterator<Item = &'a Family>) -> String {
     let is_effort = |quantity| matches!(quantity, Quantity::Torque | Quantity::Current);
     let is_like = |family: &&Family| {
         let (own, other) = (chosen.quantity, family.quantity);
-        *family != chosen && (own == other || is_effort(own) && is_effort(other))
+        let is_same = own == other && chosen.source == family.source && chosen.columns == family.columns;
+        !is_same && (own == other || is_effort(own) && is_effort(other))
     };
     let named = |family: &Family| {
         let names: Vec<String> = family.columns.iter().map(|(_, name)| name.clone()).collect();

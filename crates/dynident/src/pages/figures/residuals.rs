@@ -12,7 +12,7 @@ impl Figure {
         let mut data = Data::new(["log", "joint", "time_s", "measured_nm", "predicted_nm", "residual_nm"]);
         let mut panels = Vec::new();
         for trace in traces {
-            for (name, joint) in r.robot.joints.iter().zip(&trace.joints) {
+            for (index, (name, joint)) in r.robot.joints.iter().zip(&trace.joints).enumerate() {
                 let (time, rows) = (&trace.time_s, trace.time_s.len());
                 let (measured, predicted) = (&joint.measured_nm[..rows], &joint.predicted_nm[..rows]);
                 for row in (0..rows).filter(|row| measured[*row].is_finite()) {
@@ -22,7 +22,7 @@ impl Figure {
                     data.add(texts.into_iter().chain(numbers).collect::<Vec<_>>());
                 }
                 let title = if traces.len() > 1 { format!("{name}: {}", trace.log) } else { name.clone() };
-                let plot = LinePlot::new(title, "t, s", "torque, Nm (N)", time.clone())
+                let plot = LinePlot::new(title, "t, s", format!("torque, {}", r.torque_unit(index)), time.clone())
                     .broad("predicted", predicted.to_vec())
                     .line("measured", measured.to_vec())
                     .difference("measured minus predicted", 1, 0);
