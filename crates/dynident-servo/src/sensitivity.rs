@@ -158,8 +158,10 @@ impl Sensitivity {
             let (mode, law) = (step.laws.modes[joint], &step.laws.joints[joint]);
             let own = joint * dof + joint;
             if mode.clip == Clip::Inside {
-                self.of_q[own] -= law.stiffness;
-                self.of_v[own] -= law.stiffness * weight * known * step.h;
+                // The reach moves with the joint.
+                let beyond: f64 = step.commands[joint].beyond.iter().sum();
+                self.of_q[own] -= law.stiffness * (1.0 - beyond);
+                self.of_v[own] -= law.stiffness * weight * step.h * (known - beyond);
             }
             let by_v = drive.stribeck * step.at_rest[joint] * -2.0 * step.v[joint] / drive.stribeck_speed.powi(2);
             self.of_v[own] -= drive.damping * known + mode.motion.sign() * by_v;
@@ -169,8 +171,13 @@ impl Sensitivity {
             let (mode, law, drive) = (step.laws.modes[joint], &step.laws.joints[joint], &robot.drives[joint]);
             let (x, sign, command) = (step.x[joint], mode.motion.sign(), &step.commands[joint]);
             let inside = mode.clip == Clip::Inside;
+            // Part of the torque that is at the limit in a step with a change of the command.
+            let [below, above] = command.beyond;
             let torque = match effect.quantity {
-                Quantity::Stiffness if inside => (law.pull - law.slope * x) / drive.stiffness,
+                Quantity::Stiffness if inside => {
+                    let limited = if above > below || below > 0.0 { (above - below) * drive.torque_limit } else { 0.0 };
+                    (law.pull - law.slope * x - limited) / drive.stiffness
+                }
                 Quantity::Delay if inside => -law.stiffness * command.rate,
                 Quantity::ProfileAcceleration if inside => {
                     law.stiffness * command.by_log[0] / drive.profile_acceleration
@@ -182,7 +189,7 @@ impl Sensitivity {
                 Quantity::LoadFriction => -sign * step.loads[joint].abs(),
                 Quantity::Stribeck => -sign * step.at_rest[joint],
                 Quantity::TorqueLimit => match mode.clip {
-                    Clip::Inside => 0.0,
+                    Clip::Inside => above - below,
                     Clip::Upper => 1.0,
                     Clip::Lower => -1.0,
                 },
