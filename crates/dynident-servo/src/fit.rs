@@ -7,13 +7,15 @@
 //!
 //! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). From each
 //! start, it first minimises with long time steps and short simulations that restart from the measured motion, which
-//! have few local minima, and then without restarts. The best result is refined with accurate time steps.
+//! have few local minima, and then without restarts. The best result is refined with short time steps. All stages use
+//! the midpoint rule: long implicit Euler steps add the damping stiffness × step, which moves the minimum so far that
+//! the last stage would begin outside of the region of the best minimum.
 
 use crate::error::ServoError;
-use crate::law::DriveLaw;
 use crate::likelihood::{JointLikelihood, joint_likelihood};
 use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, total_gram};
 use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
+use crate::quantity::Quantity;
 use crate::run::Run;
 use crate::settings::ServoSettings;
 use crate::start::{drive_coordinates, equal_drives, response_coordinates};
@@ -38,6 +40,9 @@ const FIRST_CORRELATED: f64 = 25.0;
 /// Weight of a period in the fit below which it is reported as unexplained; its error is then at least five times the
 /// usual error.
 const UNEXPLAINED_WEIGHT: f64 = 0.05;
+/// Increase of the cost without a coordinate below which the coordinate is not needed: the 95 % quantile of the changes
+/// by random errors (χ² distribution with one degree of freedom).
+const UNNEEDED_COST: f64 = 3.84;
 /// Maximum change of the logarithm of a value in one step. Other coordinates change at most by their prior standard
 /// deviation.
 const LONGEST_STEP: f64 = 1.0;
@@ -130,10 +135,7 @@ impl Searcher<'_> {
         let mut damping = 1e-3;
         for iteration in 1..=most {
             let Some(sums) = self.sums(z, now) else { return (iteration, false) };
-            let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
-            for (k, parameter) in self.parameters.iter().enumerate() {
-                moment[k] -= z[k] / parameter.prior_sd.powi(2);
-            }
+            let moment = self.moment(z, &sums);
             let matrix = self.with_priors(&total_gram(&sums, z.len()));
             let Some((next, point)) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
                 return (iteration, true);
@@ -159,8 +161,9 @@ impl Searcher<'_> {
     ) -> Option<(Vec<f64>, Point)> {
         for _ in 0..ATTEMPTS {
             let mut damped = matrix.clone();
-            for k in 0..z.len() {
-                damped[(k, k)] *= 1.0 + *damping;
+            for (k, parameter) in self.parameters.iter().enumerate() {
+                // Priors are exactly quadratic: a coordinate without data returns to the centre of its prior.
+                damped[(k, k)] += *damping * (matrix[(k, k)] - parameter.prior_sd.powi(-2));
             }
             let mut step = damped.cholesky()?.solve(moment);
             if step.dot(moment) < 0.01 * self.tolerance {
@@ -184,6 +187,22 @@ impl Searcher<'_> {
         None
     }
 
+    /// Sets the torque limits that the motion does not determine to the mean of their prior, so that they do not limit
+    /// other motion. A limit near the largest torque of the logs can follow the errors of single samples.
+    fn release_limits(&self, z: &mut Vec<f64>, now: &mut Point) {
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            let is_own = parameter.quantity == Quantity::TorqueLimit && parameter.members.len() == 1;
+            if !is_own || z[k] == 0.0 {
+                continue;
+            }
+            let mut without = z.clone();
+            without[k] = 0.0;
+            if let Some(point) = self.point(&without).filter(|point| point.cost < now.cost + UNNEEDED_COST) {
+                (*z, *now) = (without, point);
+            }
+        }
+    }
+
     /// Number of neighbouring samples with equal errors, for each joint: the variance of the moments `Σ w g e` of the
     /// periods, divided by the variance for independent samples; median over the coordinates.
     fn correlated(&self, sums: &[PeriodSums]) -> Vec<f64> {
@@ -205,14 +224,14 @@ impl Searcher<'_> {
     /// Covariance of the coordinates, from the priors and a jackknife over periods (MacKinnon and White 1985; Bell and
     /// McCaffrey 2002). Without a period that has the information `G` and the moments `s`, the coordinates change by
     /// `(H - G)⁻¹ s`, where `H` is the Hessian. A covariance from the moments alone (White 1980) is too small if one
-    /// period determines much of a coordinate.
-    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    /// period determines much of a coordinate. `shift` is the error of the coordinates by the length of the time steps.
+    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>, shift: &DVector<f64>) -> Option<DMatrix<f64>> {
         let columns = self.parameters.len();
         let hessian = self.with_priors(gram);
         let inverse = hessian.clone().cholesky()?.inverse();
         let count = periods.len() as f64;
         if count < 2.0 {
-            return Some(inverse);
+            return Some(inverse + shift * shift.transpose());
         }
         let changes: Vec<DVector<f64>> = periods
             .iter()
@@ -224,12 +243,32 @@ impl Searcher<'_> {
         let mean = changes.iter().sum::<DVector<f64>>() / count;
         let priors = self.parameters.iter().map(|parameter| parameter.prior_sd.powi(-2));
         let priors = DMatrix::from_diagonal(&DVector::from_iterator(columns, priors));
-        let mut covariance = &inverse * priors * &inverse;
+        let mut covariance = &inverse * priors * &inverse + shift * shift.transpose();
         for change in &changes {
             let own = change - &mean;
             covariance.ger((count - 1.0) / count, &own, &own, 1.0);
         }
         Some(covariance)
+    }
+
+    /// Error of the coordinates by the length of the time steps: twice their change with steps of half the length, as
+    /// for an error of first order (Richardson), which dry friction causes. The change is one step of the search.
+    fn shift_by_step(&mut self, z: &[f64]) -> Option<DVector<f64>> {
+        self.stepping.step_s *= 0.5;
+        let point = self.point(z)?;
+        let sums = self.sums(z, &point)?;
+        self.stepping.step_s *= 2.0;
+        let matrix = self.with_priors(&total_gram(&sums, z.len()));
+        Some(2.0 * matrix.cholesky()?.solve(&self.moment(z, &sums)))
+    }
+
+    /// Half of the negative gradient of the cost.
+    fn moment(&self, z: &[f64], sums: &[PeriodSums]) -> DVector<f64> {
+        let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            moment[k] -= z[k] / parameter.prior_sd.powi(2);
+        }
+        moment
     }
 
     /// Coordinates of the best robot with nearly equal drives, and the number of iterations to find it. With separate
@@ -268,16 +307,25 @@ impl Searcher<'_> {
     /// it needs no stage with restarts. `None` if no start can be simulated.
     fn best_of(&mut self, starts: Vec<Vec<f64>>, near: Option<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
         let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
-        let step_s = COARSE * self.settings.step_s;
+        let coarse = Stepping::accurate(COARSE * self.settings.step_s);
         let all: &[f64] = &[RESTART_S, f64::INFINITY];
         let starts = starts.into_iter().map(|z| (z, all)).chain(near.map(|z| (z, &all[1..])));
+        // Costs with restarts: a second descent to the same minimum needs no further steps.
+        let mut known: Vec<f64> = Vec::new();
         for (mut z, restarts) in starts {
             let mut cost = f64::INFINITY;
             for &restart_s in restarts {
-                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s, law: DriveLaw::Identified };
+                self.stepping = Stepping { restart_s, ..coarse };
                 let Some(mut now) = self.point(&z) else { continue };
                 iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
-                cost = now.cost;
+                if restart_s.is_finite() {
+                    if known.iter().any(|known| (known - now.cost).abs() < self.tolerance) {
+                        break;
+                    }
+                    known.push(now.cost);
+                } else {
+                    cost = now.cost;
+                }
             }
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, z));
@@ -343,6 +391,9 @@ pub fn search(
     for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
         searcher.tolerance = tolerance;
         let mut now = searcher.point(&z).ok_or_else(no_start)?;
+        if tolerance == settings.tolerance {
+            searcher.release_limits(&mut z, &mut now);
+        }
         let (steps, ended) = searcher.descend(&mut z, &mut now, settings.iterations);
         (iterations, settled) = (iterations + steps, ended);
         let sums = searcher.sums(&z, &now).ok_or_else(no_start)?;
@@ -353,7 +404,8 @@ pub fn search(
     }
     let (now, sums) = end.ok_or_else(no_start)?;
     let information = total_gram(&sums, z.len());
-    let covariance = searcher.covariance(&sums, &information).ok_or_else(no_start)?;
+    let shift = searcher.shift_by_step(&z).ok_or_else(no_start)?;
+    let covariance = searcher.covariance(&sums, &information, &shift).ok_or_else(no_start)?;
     Ok(Search {
         covariance,
         information,
