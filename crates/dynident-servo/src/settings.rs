@@ -16,7 +16,7 @@ pub struct ServoSettings {
     /// Maximum number of steps of the search. Default 60; fits of an SO-101 need 10 to 40.
     pub iterations: usize,
     /// Decrease of the cost in one step below which the search ends. The cost is minus twice the log-likelihood, so
-    /// random errors change it by about 1 for each parameter. Default 0.01.
+    /// random errors change it by about 1 for each parameter. Default 0.1.
     pub tolerance: f64,
     /// Length of the time periods whose errors are treated as independent for the error bars, s. Default 2: model
     /// errors of an SO-101 are correlated for up to 1 s.
@@ -68,7 +68,7 @@ impl Default for ServoSettings {
             step_s: 0.0025,
             physics_step_s: 0.005,
             iterations: 60,
-            tolerance: 0.01,
+            tolerance: 0.1,
             period_s: 2.0,
             period_freedom: 30.0,
             least_error: 4.4e-4,
