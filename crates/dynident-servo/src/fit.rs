@@ -2,14 +2,14 @@
 //!
 //! Each unknown is described by a coordinate `z`, which is zero for the nominal value and has the prior standard
 //! deviation `sd`. The cost is minus twice the logarithm of the likelihood of all joints (`likelihood.rs`) plus the
-//! priors, `Σ (z / sd)²`. The method of Levenberg and Marquardt minimises the cost, with exact derivatives of the
-//! simulation.
+//! priors, `Σ (z / sd)²`. Newton steps within a trust region (`trust.rs`) minimise the cost, with exact first
+//! derivatives of the simulation.
 //!
-//! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). From each
-//! start, it first minimises with long time steps and short simulations that restart from the measured motion, which
-//! have few local minima, and then without restarts. The best result is refined with short time steps. All stages use
-//! the midpoint rule: long implicit Euler steps add the damping stiffness × step, which moves the minimum so far that
-//! the last stage would begin outside of the region of the best minimum.
+//! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). It first
+//! minimises with long time steps and short simulations that restart from the measured motion, which have few local
+//! minima, and then without restarts. The best result is refined with short time steps. All stages use the midpoint
+//! rule: long implicit Euler steps add the damping stiffness × step, which moves the minimum so far that the last stage
+//! would begin outside of the region of the best minimum.
 
 use crate::covariance::{correlated_samples, jackknife};
 use crate::error::ServoError;

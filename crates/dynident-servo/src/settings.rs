@@ -13,7 +13,7 @@ pub struct ServoSettings {
     /// Physics step of the simulator for which `export` estimates the error of its files, s. Default 0.005, the step of
     /// many tasks of Isaac Lab.
     pub physics_step_s: f64,
-    /// Maximum number of steps of the search. Default 60; fits of an SO-101 need 10 to 40.
+    /// Maximum number of steps of the search. Default 60; fits of an SO-101 need about 10.
     pub iterations: usize,
     /// Decrease of the cost in one step below which the search ends. The cost is minus twice the log-likelihood, so
     /// random errors change it by about 1 for each parameter. Default 0.1.
