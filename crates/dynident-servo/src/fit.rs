@@ -188,8 +188,8 @@ impl Searcher<'_> {
         (most, false)
     }
 
-    /// Coordinates with a lower cost, and the radius of the next trust region; `None` if no step is expected to decrease
-    /// the cost by more than the tolerance.
+    /// Coordinates with a lower cost; sets the radius of the next trust region. `None` if no step is expected to
+    /// decrease the cost by more than the tolerance.
     fn lower(&self, z: &[f64], cost: f64, model: &Quadratic, radius: &mut f64) -> Option<(Vec<f64>, Point)> {
         for _ in 0..ATTEMPTS {
             let step = model.step(*radius);

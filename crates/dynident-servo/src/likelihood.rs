@@ -64,8 +64,8 @@ pub(crate) fn joint_likelihood(errors: &[PeriodError], floor: f64, correlated: f
         (freedom + independent) * outside + independent * variance.ln()
     };
     let decrease: Vec<f64> = errors.iter().map(|own| 2.0 / (freedom + own.count / correlated)).collect();
-    // Second derivative of half of the cost by the logarithm of the variance, and mixed derivatives by the logarithm and
-    // by the coordinates.
+    // Second derivative of half of the cost by the logarithm of the variance, and mixed derivatives by the logarithm
+    // and by the coordinates.
     let of_weight = |(relative, decrease): (&f64, &f64)| 0.5 * freedom * relative * decrease;
     let mixed: Vec<f64> = relative.iter().zip(&decrease).map(of_weight).collect();
     let scaled = errors.iter().zip(&relative).map(|(own, relative)| relative * square(own) / (correlated * variance));

@@ -35,8 +35,8 @@ pub struct ServoSettings {
     /// Relative standard deviation of each joint's stiffness, damping and armature from the common value. Default 0.1:
     /// servos of one type differ by a few per cent in gain and motor constant.
     pub deviation: f64,
-    /// Relative standard deviation of each joint's friction (Coulomb friction, friction per load, additional friction at
-    /// rest) from the common value. Default 1: gears of one type differ by their wear and by the preload of their
+    /// Relative standard deviation of each joint's friction (Coulomb friction, friction per load, additional friction
+    /// at rest) from the common value. Default 1: gears of one type differ by their wear and by the preload of their
     /// bearings.
     pub friction_deviation: f64,
     /// Relative standard deviation of each joint's torque limit from the common value. Default 1: firmware limits the

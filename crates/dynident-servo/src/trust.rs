@@ -1,9 +1,9 @@
 //! Steps of the search: the minimum of a quadratic model of the cost within a trust region.
 //!
 //! Many unknowns of a servo arm have nearly the same effect (friction and weight, a common value and those of the
-//! joints). A Newton step is then very long in directions that the motion hardly determines. The trust region limits the
-//! step in these directions only, whereas a shorter step of the same direction would hardly progress in the others
-//! (Moré and Sorensen, SIAM J. Sci. Stat. Comput. 4, 1983).
+//! joints). A Newton step is then very long in directions that the motion hardly determines. The trust region limits
+//! mainly these directions. A shorter step along the Newton direction would hardly progress in the others (Moré and
+//! Sorensen, SIAM J. Sci. Stat. Comput. 4, 1983).
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
