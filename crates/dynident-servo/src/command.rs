@@ -137,7 +137,8 @@ impl<'a> SetPoint<'a> {
         }))
     }
 
-    /// Set point from `start_s` to `end_s` of a controller with this reach. The times of successive calls must increase.
+    /// Set point from `start_s` to `end_s` of a controller with this reach. The times of successive calls must
+    /// increase.
     pub(crate) fn during(&mut self, start_s: f64, end_s: f64, reach: Reach) -> StepCommand {
         match self {
             Self::Held(command) => command.mean(start_s, end_s, reach),

@@ -149,8 +149,8 @@ impl Searcher<'_> {
     }
 
     /// Hessian of half of the cost, without second derivatives of the simulation. The weights and variances of the
-    /// likelihood follow the errors, which lowers the curvature. Without this decrease, steps towards a minimum in which
-    /// a period loses its weight are much too short.
+    /// likelihood follow the errors, which lowers the curvature. Without this decrease, steps towards a minimum in
+    /// which a period loses its weight are much too short.
     fn curvature(&self, sums: &[PeriodSums], now: &Point) -> DMatrix<f64> {
         let columns = self.parameters.len();
         let mut matrix = self.with_priors(&total_gram(sums, columns));
