@@ -2,33 +2,39 @@
 //!
 //! Each unknown is described by a coordinate `z`, which is zero for the nominal value and has the prior standard
 //! deviation `sd`. The cost is minus twice the logarithm of the likelihood of all joints (`likelihood.rs`) plus the
-//! priors, `Σ (z / sd)²`. The method of Levenberg and Marquardt minimises the cost, with exact derivatives of the
-//! simulation.
+//! priors, `Σ (z / sd)²`. Newton steps within a trust region (`trust.rs`) minimise the cost, with exact first
+//! derivatives of the simulation.
 //!
-//! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). From each
-//! start, it first minimises with long time steps and short simulations that restart from the measured motion, which
-//! have few local minima, and then without restarts. The best result is refined with accurate time steps.
+//! The search starts at the given coordinates and at coordinates from the joints' responses (`start.rs`). It first
+//! minimises with long time steps and short simulations that restart from the measured motion, which have few local
+//! minima, and then without restarts. The best result is refined with short time steps. All stages use the midpoint
+//! rule: long implicit Euler steps add the damping stiffness × step, which moves the minimum so far that the last stage
+//! would begin outside of the region of the best minimum.
 
+use crate::covariance::{correlated_samples, jackknife};
 use crate::error::ServoError;
-use crate::law::DriveLaw;
 use crate::likelihood::{JointLikelihood, joint_likelihood};
-use crate::normal::{PeriodSums, Periods, period_errors, period_sums, symmetric, total_gram};
-use crate::parameters::{Change, FreeParameter, ServoRobot, VariedRobot};
+use crate::normal::{PeriodSums, Periods, period_errors, period_sums, total_gram};
+use crate::parameters::{FreeParameter, ServoRobot, VariedRobot};
+use crate::quantity::Quantity;
 use crate::run::Run;
 use crate::settings::ServoSettings;
 use crate::start::{drive_coordinates, equal_drives, response_coordinates};
 use crate::step_state::Stepping;
+use crate::trust::Quadratic;
 use crate::unknowns::unknowns;
 use nalgebra::{DMatrix, DVector};
 
 /// Ratio of the time step in the first stages of the search to that of the settings.
-const COARSE: f64 = 4.0;
+const LONG_STEP: f64 = 4.0;
 /// Time between restarts of the simulation in the first stage, s: longer than the response of a servo.
 const RESTART_S: f64 = 0.5;
 /// Maximum difference between the coordinates of two starts that are treated as the same start.
 const SAME_START: f64 = 1e-3;
 /// Maximum number of steps in each of the first stages.
 const ROUGH_ITERATIONS: usize = 15;
+/// Maximum number of steps from each of several starts before the best of them is selected.
+const TRIAL_ITERATIONS: usize = 5;
 /// Decrease of the cost in one step below which the first stages end.
 const ROUGH_TOLERANCE: f64 = 1.0;
 /// Maximum number of periods of all runs together; each needs memory for a matrix.
@@ -38,10 +44,21 @@ const FIRST_CORRELATED: f64 = 25.0;
 /// Weight of a period in the fit below which it is reported as unexplained; its error is then at least five times the
 /// usual error.
 const UNEXPLAINED_WEIGHT: f64 = 0.05;
-/// Maximum change of the logarithm of a value in one step. Other coordinates change at most by their prior standard
-/// deviation.
+/// Increase of the cost without a coordinate below which the coordinate is not needed: the 95 % quantile of the changes
+/// by random errors (χ² distribution with one degree of freedom).
+const UNNEEDED_COST: f64 = 3.84;
+/// Scale of the logarithm of a value in the trust region; other coordinates have at most the scale of their prior.
 const LONGEST_STEP: f64 = 1.0;
-/// Maximum number of attempts to find a shorter step that decreases the cost.
+/// Radius of the first trust region, in units of the scales.
+const FIRST_RADIUS: f64 = 2.0;
+/// Ratio of the decrease of the cost to the expected decrease below which the trust region shrinks, and above which it
+/// may grow (Nocedal and Wright, Numerical Optimization, 2006, algorithm 4.1).
+const LOW_RATIO: f64 = 0.25;
+const HIGH_RATIO: f64 = 0.75;
+/// Radius of the next trust region, in units of the last step.
+const SHRINK: f64 = 0.25;
+const GROW: f64 = 2.0;
+/// Maximum number of trust regions in one step.
 const ATTEMPTS: usize = 12;
 
 /// Result of a search.
@@ -116,6 +133,13 @@ impl Searcher<'_> {
         period_sums(&varied, self.runs, (self.stepping, &self.periods), &weights)
     }
 
+    /// The point at some coordinates, and its sums.
+    fn sums_at(&self, z: &[f64]) -> Option<(Point, Vec<PeriodSums>)> {
+        let point = self.point(z)?;
+        let sums = self.sums(z, &point)?;
+        Some((point, sums))
+    }
+
     fn with_priors(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
         let mut matrix = gram.clone();
         for (k, parameter) in self.parameters.iter().enumerate() {
@@ -124,18 +148,34 @@ impl Searcher<'_> {
         matrix
     }
 
+    /// Hessian of half of the cost, without second derivatives of the simulation. The weights and variances of the
+    /// likelihood follow the errors, which lowers the curvature. Without this decrease, steps towards a minimum in
+    /// which a period loses its weight are much too short.
+    fn curvature(&self, sums: &[PeriodSums], now: &Point) -> DMatrix<f64> {
+        let columns = self.parameters.len();
+        let mut matrix = self.with_priors(&total_gram(sums, columns));
+        for (joint, own) in now.joints.iter().enumerate() {
+            let mut by_variance = DVector::zeros(columns);
+            for ((period, decrease), part) in sums.iter().zip(&own.decrease).zip(&own.variance_part) {
+                let moment = &period.moments[joint];
+                matrix.ger(-decrease, moment, moment, 1.0);
+                by_variance.axpy(*part, moment, 1.0);
+            }
+            matrix.ger(-1.0, &by_variance, &by_variance, 1.0);
+        }
+        matrix
+    }
+
     /// Makes steps until the cost converges, at most `most`. Returns the number of steps and whether the cost
     /// converged.
     fn descend(&self, z: &mut Vec<f64>, now: &mut Point, most: usize) -> (usize, bool) {
-        let mut damping = 1e-3;
+        let scales = self.parameters.iter().map(|parameter| parameter.prior_sd.min(LONGEST_STEP));
+        let scales = DVector::from_iterator(z.len(), scales);
+        let mut radius = FIRST_RADIUS;
         for iteration in 1..=most {
             let Some(sums) = self.sums(z, now) else { return (iteration, false) };
-            let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
-            for (k, parameter) in self.parameters.iter().enumerate() {
-                moment[k] -= z[k] / parameter.prior_sd.powi(2);
-            }
-            let matrix = self.with_priors(&total_gram(&sums, z.len()));
-            let Some((next, point)) = self.lower(z, now.cost, &matrix, &moment, &mut damping) else {
+            let model = Quadratic::new(&self.curvature(&sums, now), &self.moment(z, &sums), scales.clone());
+            let Some((next, point)) = self.lower(z, now.cost, &model, &mut radius) else {
                 return (iteration, true);
             };
             let fall = now.cost - point.cost;
@@ -148,88 +188,62 @@ impl Searcher<'_> {
         (most, false)
     }
 
-    /// Coordinates with a lower cost; `None` if no step decreases the cost by more than the tolerance.
-    fn lower(
-        &self,
-        z: &[f64],
-        cost: f64,
-        matrix: &DMatrix<f64>,
-        moment: &DVector<f64>,
-        damping: &mut f64,
-    ) -> Option<(Vec<f64>, Point)> {
+    /// Coordinates with a lower cost; sets the radius of the next trust region. `None` if no step is expected to
+    /// decrease the cost by more than the tolerance.
+    fn lower(&self, z: &[f64], cost: f64, model: &Quadratic, radius: &mut f64) -> Option<(Vec<f64>, Point)> {
         for _ in 0..ATTEMPTS {
-            let mut damped = matrix.clone();
-            for k in 0..z.len() {
-                damped[(k, k)] *= 1.0 + *damping;
-            }
-            let mut step = damped.cholesky()?.solve(moment);
-            if step.dot(moment) < 0.01 * self.tolerance {
+            let step = model.step(*radius);
+            if step.expected < self.tolerance {
                 return None;
             }
-            let excess = |(step, parameter): (&f64, &FreeParameter)| match parameter.change {
-                Change::Factor => step.abs() / LONGEST_STEP,
-                Change::Sum => step.abs() / parameter.prior_sd,
-            };
-            let excess = step.iter().zip(self.parameters).map(excess).fold(0.0, f64::max);
-            if excess > 1.0 {
-                step /= excess;
+            let next: Vec<f64> = z.iter().zip(step.change.iter()).map(|(z, d)| z + d).collect();
+            let point = self.point(&next);
+            let ratio = point.as_ref().map_or(0.0, |point| (cost - point.cost) / step.expected);
+            if ratio < LOW_RATIO {
+                *radius = SHRINK * step.length;
+            } else if ratio > HIGH_RATIO {
+                *radius = radius.max(GROW * step.length);
             }
-            let next: Vec<f64> = z.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
-            if let Some(point) = self.point(&next).filter(|point| point.cost < cost) {
-                *damping = (*damping * 0.2).max(1e-9);
-                return Some((next, point));
+            if ratio > 0.0 {
+                return point.map(|point| (next, point));
             }
-            *damping *= 5.0;
         }
         None
     }
 
-    /// Number of neighbouring samples with equal errors, for each joint: the variance of the moments `Σ w g e` of the
-    /// periods, divided by the variance for independent samples; median over the coordinates.
-    fn correlated(&self, sums: &[PeriodSums]) -> Vec<f64> {
-        let of_joint = |(joint, now): (usize, &f64)| {
-            let mut ratios: Vec<f64> = (0..self.parameters.len())
-                .filter_map(|k| {
-                    let expected: f64 = sums.iter().map(|own| own.diagonals[joint][k]).sum();
-                    let together: f64 = sums.iter().map(|own| own.moments[joint][k].powi(2)).sum();
-                    // The moments were computed with the weights 1 / (variance × correlated).
-                    (expected > 0.0).then(|| now * together / expected)
-                })
-                .collect();
-            ratios.sort_by(f64::total_cmp);
-            ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.max(1.0))
-        };
-        self.correlated.iter().enumerate().map(of_joint).collect()
+    /// Sets the torque limits that the motion does not determine to the mean of their prior, so that they do not limit
+    /// other motion. A limit near the largest torque of the logs can follow the errors of single samples.
+    fn release_limits(&self, z: &mut Vec<f64>, now: &mut Point) {
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            let is_own = parameter.quantity == Quantity::TorqueLimit && parameter.members.len() == 1;
+            if !is_own || z[k] == 0.0 {
+                continue;
+            }
+            let mut without = z.clone();
+            without[k] = 0.0;
+            if let Some(point) = self.point(&without).filter(|point| point.cost < now.cost + UNNEEDED_COST) {
+                (*z, *now) = (without, point);
+            }
+        }
     }
 
-    /// Covariance of the coordinates, from the priors and a jackknife over periods (MacKinnon and White 1985; Bell and
-    /// McCaffrey 2002). Without a period that has the information `G` and the moments `s`, the coordinates change by
-    /// `(H - G)⁻¹ s`, where `H` is the Hessian. A covariance from the moments alone (White 1980) is too small if one
-    /// period determines much of a coordinate.
-    fn covariance(&self, periods: &[PeriodSums], gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let columns = self.parameters.len();
-        let hessian = self.with_priors(gram);
-        let inverse = hessian.clone().cholesky()?.inverse();
-        let count = periods.len() as f64;
-        if count < 2.0 {
-            return Some(inverse);
+    /// Error of the coordinates by the length of the time steps: their change with steps of twice the length, as for an
+    /// error of first order (Richardson), which dry friction causes. The change is one step of the search.
+    fn shift_by_step(&mut self, z: &[f64]) -> Option<DVector<f64>> {
+        self.stepping.step_s *= 2.0;
+        let (_, sums) = self.sums_at(z)?;
+        self.stepping.step_s *= 0.5;
+        let matrix = self.with_priors(&total_gram(&sums, z.len()));
+        Some(matrix.cholesky()?.solve(&self.moment(z, &sums)))
+    }
+
+    /// Half of the negative gradient of the cost.
+    fn moment(&self, z: &[f64], sums: &[PeriodSums]) -> DVector<f64> {
+        let mut moment: DVector<f64> = sums.iter().map(PeriodSums::moment).sum();
+        for (k, parameter) in self.parameters.iter().enumerate() {
+            moment[k] -= z[k] / parameter.prior_sd.powi(2);
         }
-        let changes: Vec<DVector<f64>> = periods
-            .iter()
-            .map(|period| {
-                let rest = &hessian - symmetric(&period.gram, columns);
-                Some(rest.cholesky()?.solve(&period.moment()))
-            })
-            .collect::<Option<_>>()?;
-        let mean = changes.iter().sum::<DVector<f64>>() / count;
-        let priors = self.parameters.iter().map(|parameter| parameter.prior_sd.powi(-2));
-        let priors = DMatrix::from_diagonal(&DVector::from_iterator(columns, priors));
-        let mut covariance = &inverse * priors * &inverse;
-        for change in &changes {
-            let own = change - &mean;
-            covariance.ger((count - 1.0) / count, &own, &own, 1.0);
-        }
-        Some(covariance)
+        moment
     }
 
     /// Coordinates of the best robot with nearly equal drives, and the number of iterations to find it. With separate
@@ -264,26 +278,35 @@ impl Searcher<'_> {
         (start, iterations)
     }
 
-    /// Minimises from each of `starts` and from `near`, and returns the best result. `near` is close to a minimum, so
-    /// it needs no stage with restarts. `None` if no start can be simulated.
+    /// Searches for the region of the best minimum with long time steps: first from each of `starts`, with restarts
+    /// from the measured motion, and then without restarts from the best result and from `near`, which is close to a
+    /// minimum. `None` if no start can be simulated.
     fn best_of(&mut self, starts: Vec<Vec<f64>>, near: Option<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
-        let (mut best, mut iterations): (Option<(f64, Vec<f64>)>, usize) = (None, 0);
-        let step_s = COARSE * self.settings.step_s;
-        let all: &[f64] = &[RESTART_S, f64::INFINITY];
-        let starts = starts.into_iter().map(|z| (z, all)).chain(near.map(|z| (z, &all[1..])));
-        for (mut z, restarts) in starts {
-            let mut cost = f64::INFINITY;
-            for &restart_s in restarts {
-                self.stepping = Stepping { step_s, end_weight: 1.0, restart_s, law: DriveLaw::Identified };
-                let Some(mut now) = self.point(&z) else { continue };
-                iterations += self.descend(&mut z, &mut now, ROUGH_ITERATIONS.min(self.settings.iterations)).0;
-                cost = now.cost;
-            }
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, z));
+        let long = Stepping::accurate(LONG_STEP * self.settings.step_s);
+        self.stepping = Stepping { restart_s: RESTART_S, ..long };
+        let (first, iterations) = self.best(starts);
+        self.stepping = long;
+        let (best, more) = self.best(first.into_iter().chain(near).collect());
+        (best, iterations + more)
+    }
+
+    /// Minimises from the best of `starts`: after a few steps from each, only the one with the lowest cost continues.
+    fn best(&self, starts: Vec<Vec<f64>>) -> (Option<Vec<f64>>, usize) {
+        let (mut best, mut iterations): (Option<(Point, Vec<f64>)>, usize) = (None, 0);
+        let most = ROUGH_ITERATIONS.min(self.settings.iterations);
+        let trial = if starts.len() > 1 { TRIAL_ITERATIONS.min(most) } else { 0 };
+        for mut z in starts {
+            let Some(mut now) = self.point(&z) else { continue };
+            iterations += self.descend(&mut z, &mut now, trial).0;
+            if best.as_ref().is_none_or(|(least, _)| now.cost < least.cost) {
+                best = Some((now, z));
             }
         }
-        (best.filter(|(cost, _)| cost.is_finite()).map(|(_, z)| z), iterations)
+        let best = best.map(|(mut now, mut z)| {
+            iterations += self.descend(&mut z, &mut now, most - trial).0;
+            z
+        });
+        (best, iterations)
     }
 }
 
@@ -329,31 +352,25 @@ pub fn search(
     let (z, mut iterations) = searcher.best_of(starts, near);
     iterations += extra;
     let mut z = z.ok_or_else(no_start)?;
-    searcher.stepping = Stepping { restart_s: f64::INFINITY, ..searcher.stepping };
-    let rough = |searcher: &Searcher<'_>, z: &[f64]| {
-        let now = searcher.point(z)?;
-        searcher.sums(z, &now)
-    };
-    searcher.correlated = searcher.correlated(&rough(&searcher, &z).ok_or_else(no_start)?);
-    searcher.stepping = Stepping::accurate(settings.step_s);
-    let mut settled = false;
-    let mut end = None;
-    // The first pass gives the number of neighbouring samples with equal errors at the end of the search; the second
-    // uses it.
-    for tolerance in [settings.tolerance.max(ROUGH_TOLERANCE), settings.tolerance] {
-        searcher.tolerance = tolerance;
-        let mut now = searcher.point(&z).ok_or_else(no_start)?;
-        let (steps, ended) = searcher.descend(&mut z, &mut now, settings.iterations);
-        (iterations, settled) = (iterations + steps, ended);
-        let sums = searcher.sums(&z, &now).ok_or_else(no_start)?;
-        if tolerance > settings.tolerance {
-            searcher.correlated = searcher.correlated(&sums);
-        }
-        end = Some((now, sums));
+    // The number of neighbouring samples with equal errors is that at the end of the previous stage.
+    for _ in 0..2 {
+        let (_, sums) = searcher.sums_at(&z).ok_or_else(no_start)?;
+        searcher.correlated = correlated_samples(&searcher.correlated, &sums);
+        let (next, more) = searcher.best(vec![z]);
+        z = next.ok_or_else(no_start)?;
+        iterations += more;
     }
-    let (now, sums) = end.ok_or_else(no_start)?;
+    searcher.stepping = Stepping::accurate(settings.step_s);
+    searcher.tolerance = settings.tolerance;
+    let mut now = searcher.point(&z).ok_or_else(no_start)?;
+    searcher.release_limits(&mut z, &mut now);
+    let (steps, settled) = searcher.descend(&mut z, &mut now, settings.iterations);
+    iterations += steps;
+    let sums = searcher.sums(&z, &now).ok_or_else(no_start)?;
     let information = total_gram(&sums, z.len());
-    let covariance = searcher.covariance(&sums, &information).ok_or_else(no_start)?;
+    let shift = searcher.shift_by_step(&z).ok_or_else(no_start)?;
+    let hessian = searcher.with_priors(&information);
+    let covariance = jackknife(&sums, &hessian, parameters).ok_or_else(no_start)? + &shift * shift.transpose();
     Ok(Search {
         covariance,
         information,

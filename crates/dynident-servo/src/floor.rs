@@ -1,7 +1,7 @@
 //! A floor that points of the robot can touch.
 
 use dynident_dynamics::{Workspace, body_placements};
-use dynident_model::{Model, Vec3};
+use dynident_model::{Model, Transform, Vec3};
 
 /// A horizontal floor below the robot, without friction.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,27 +53,33 @@ impl PointHeight {
         Self { height: 0.0, first: vec![0.0; dof], second: vec![0.0; dof * dof] }
     }
 
-    /// Computes the height at positions `q`. With joint axes `a`, joint origins `o` and the point `p`:
-    /// `∂p/∂q_i = a_i × (p - o_i)` and, for a joint `i` before `j`, `∂²p/∂q_i∂q_j = a_i × (a_j × (p - o_j))`. If joint
-    /// `j` is a slide, they are `∂p/∂q_j = a_j` and `a_i × a_j`; if joint `i` is a slide, the second derivative is
-    /// zero.
+    /// Computes the height at positions `q` and its first derivatives. With joint axes `a`, joint origins `o` and the
+    /// point `p`: `∂p/∂q_i = a_i × (p - o_i)`. If joint `i` is a slide, `∂p/∂q_i = a_i`.
     pub(crate) fn compute(&mut self, model: &Model, workspace: &mut Workspace, q: &[f64], point: &FloorPoint) {
-        let dof = q.len();
         let placements = body_placements(model, workspace, q);
-        let gravity = model.gravity();
-        let up = gravity.scale(-1.0 / gravity.norm());
+        let up = up(model);
         let position = placements[point.body].point(point.at_m);
         self.height = up.dot(position);
         self.first.fill(0.0);
-        self.second.fill(0.0);
-        let path = model.path(point.body);
-        for (at, &joint) in path.iter().enumerate() {
-            let map = &model.maps()[joint];
-            let axis = placements[joint].rotation.mul_vec(map.axis);
-            let by_joint = if map.is_rotary { axis.cross(position - placements[joint].translation) } else { axis };
+        for joint in model.path(point.body) {
+            let by_joint = by_joint(model, placements, joint, position);
             for (column, factor) in model.drivers(joint) {
                 self.first[column] += factor * up.dot(by_joint);
             }
+        }
+    }
+
+    /// Computes the second derivatives: for a joint `i` before `j`, `∂²p/∂q_i∂q_j = a_i × (a_j × (p - o_j))`. If joint
+    /// `j` is a slide, they are `a_i × a_j`; if joint `i` is a slide, they are zero.
+    pub(crate) fn compute_second(&mut self, model: &Model, workspace: &mut Workspace, q: &[f64], point: &FloorPoint) {
+        let dof = q.len();
+        let placements = body_placements(model, workspace, q);
+        let up = up(model);
+        let position = placements[point.body].point(point.at_m);
+        self.second.fill(0.0);
+        let path = model.path(point.body);
+        for (at, &joint) in path.iter().enumerate() {
+            let by_joint = by_joint(model, placements, joint, position);
             for &before in &path[..=at] {
                 let earlier = &model.maps()[before];
                 if !earlier.is_rotary {
@@ -91,4 +97,17 @@ impl PointHeight {
             }
         }
     }
+}
+
+/// Unit vector against gravity.
+fn up(model: &Model) -> Vec3 {
+    let gravity = model.gravity();
+    gravity.scale(-1.0 / gravity.norm())
+}
+
+/// Derivative of a position by the position of a joint before it.
+fn by_joint(model: &Model, placements: &[Transform], joint: usize, position: Vec3) -> Vec3 {
+    let map = &model.maps()[joint];
+    let axis = placements[joint].rotation.mul_vec(map.axis);
+    if map.is_rotary { axis.cross(position - placements[joint].translation) } else { axis }
 }

@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod command;
+mod covariance;
 #[cfg(test)]
 mod derivative_tests;
 mod design;
@@ -27,6 +28,7 @@ mod settings;
 mod start;
 mod step;
 mod step_state;
+mod trust;
 mod unknowns;
 mod validation;
 mod values;

@@ -30,6 +30,12 @@ pub(crate) struct JointLikelihood {
     pub(crate) weights: Vec<f64>,
     /// `w_p`: 1 for a period with the usual error, small for one that the model does not explain.
     pub(crate) relative: Vec<f64>,
+    /// Decrease of the curvature of half of the cost by the moments `m_p = w_p / (c σ²) Σ g e` of the periods, because
+    /// the weights decrease with the errors: `2 / (ν + N_p)`. The curvature is lower by `2 / (ν + N_p) m_p m_pᵀ`.
+    pub(crate) decrease: Vec<f64>,
+    /// Decrease of the curvature because the variance follows the errors. The curvature is lower by `b bᵀ`, where
+    /// `b = Σ_p variance_part_p m_p`.
+    pub(crate) variance_part: Vec<f64>,
     /// Root mean square error over all periods.
     pub(crate) error: f64,
 }
@@ -57,10 +63,19 @@ pub(crate) fn joint_likelihood(errors: &[PeriodError], floor: f64, correlated: f
         let outside = (square(own) / (correlated * freedom * variance)).ln_1p();
         (freedom + independent) * outside + independent * variance.ln()
     };
+    let decrease: Vec<f64> = errors.iter().map(|own| 2.0 / (freedom + own.count / correlated)).collect();
+    // Second derivative of half of the cost by the logarithm of the variance, and mixed derivatives by the logarithm
+    // and by the coordinates.
+    let of_weight = |(relative, decrease): (&f64, &f64)| 0.5 * freedom * relative * decrease;
+    let mixed: Vec<f64> = relative.iter().zip(&decrease).map(of_weight).collect();
+    let scaled = errors.iter().zip(&relative).map(|(own, relative)| relative * square(own) / (correlated * variance));
+    let by_variance = 0.5 * scaled.zip(&mixed).map(|(scaled, mixed)| scaled * mixed).sum::<f64>();
     JointLikelihood {
         cost: errors.iter().map(of_period).sum(),
         weights: relative.iter().map(|relative| relative / (correlated * variance)).collect(),
         relative,
+        decrease,
+        variance_part: mixed.iter().map(|mixed| mixed / by_variance.sqrt()).collect(),
         error: (errors.iter().map(|own| own.squares).sum::<f64>() / samples).sqrt(),
     }
 }
@@ -104,5 +119,34 @@ mod tests {
         };
         let difference = (at(0.5).cost - at(-0.5).cost) / 1.0;
         assert!((difference / at(0.0).weights[3] - 1.0).abs() < 1e-4, "{difference} {}", at(0.0).weights[3]);
+    }
+
+    /// The curvature with the weights and the decreases is the second derivative of half of the cost by a coordinate
+    /// that changes all errors.
+    #[test]
+    fn curvatures_are_second_derivatives() {
+        let sample = |period: usize, k: usize| {
+            let place = (100 * period + k) as f64;
+            let scale = if period == 3 { 8.0 } else { 1.0 };
+            (scale * ((0.37 * place).sin() + 0.4 * (0.11 * place).cos()), (0.011 * place).cos())
+        };
+        let sum = |period: usize, of: &dyn Fn(f64, f64) -> f64| {
+            (0..100).map(|k| sample(period, k)).map(|(error, g)| of(error, g)).sum::<f64>()
+        };
+        let at = |z: f64| {
+            let own = |period| PeriodError { squares: sum(period, &|error, g| (error - g * z).powi(2)), count: 100.0 };
+            joint_likelihood(&(0..20).map(own).collect::<Vec<_>>(), 0.1, 25.0, 4.0)
+        };
+        let z = 0.3;
+        let now = at(z);
+        let moments: Vec<f64> = (0..20).map(|p| now.weights[p] * sum(p, &|error, g| g * (error - g * z))).collect();
+        let constant_weights: f64 = (0..20).map(|p| now.weights[p] * sum(p, &|_, g| g * g)).sum();
+        let decrease: f64 = now.decrease.iter().zip(&moments).map(|(own, moment)| own * moment * moment).sum();
+        let by_variance: f64 = now.variance_part.iter().zip(&moments).map(|(own, moment)| own * moment).sum();
+        let curvature = constant_weights - decrease - by_variance.powi(2);
+        let h = 1e-3;
+        let expected = 0.5 * (at(z + h).cost - 2.0 * now.cost + at(z - h).cost) / (h * h);
+        assert!((curvature / expected - 1.0).abs() < 1e-3, "{curvature} {expected}");
+        assert!(constant_weights > 1.05 * expected, "{constant_weights} {expected}");
     }
 }

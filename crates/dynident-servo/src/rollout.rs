@@ -11,7 +11,7 @@
 //! `w = 1/2` (midpoint rule), smooth torques are exact to second order, and no damping is added; `w = 1` adds the
 //! damping stiffness × h. Dry friction acts against `x`. `sensitivity.rs` computes the derivatives.
 
-use crate::command::SetPoint;
+use crate::command::{Reach, SetPoint};
 use crate::law::DriveLaw;
 use crate::parameters::VariedRobot;
 use crate::quantity::Quantity;
@@ -173,10 +173,17 @@ impl<'a> Rollout<'a> {
         }
         for (joint, drive) in robot.drives.iter().enumerate() {
             step.a[joint * dof + joint] += drive.armature / step.h;
-            let command = commands[joint].during(from - drive.delay_s, to - drive.delay_s);
+            let stiffness = self.run.gain(joint) * drive.stiffness;
+            let reach = match self.stepping.law {
+                DriveLaw::Identified => {
+                    Reach { centre: step.q[joint] + weight * h * step.v[joint], half: drive.torque_limit / stiffness }
+                }
+                // Simulators evaluate one command in a step.
+                DriveLaw::Implicit | DriveLaw::Explicit => Reach::UNLIMITED,
+            };
+            let command = commands[joint].during(from - drive.delay_s, to - drive.delay_s, reach);
             step.commands[joint] = command;
             step.at_rest[joint] = (-(step.v[joint] / drive.stribeck_speed).powi(2)).exp();
-            let stiffness = self.run.gain(joint) * drive.stiffness;
             let friction =
                 drive.coulomb + drive.load_friction * step.loads[joint].abs() + drive.stribeck * step.at_rest[joint];
             let identified = JointLaw {

@@ -82,7 +82,22 @@ impl Sensitivity {
         varied: &VariedRobot,
         (model, workspace): (&Model, &mut Workspace),
         solver: &StepSolver,
-        step: &StepState,
+        step: &mut StepState,
+    ) {
+        // The velocities of resting joints do not depend on the coordinates.
+        if !solver.moving.is_empty() {
+            self.set_equation(varied, (model, workspace), solver, step);
+        }
+        dispatch_single(self.level, Solve { sensitivity: self, solver, step });
+    }
+
+    /// Computes the matrices and the direct effects of the coordinates. Rows of resting joints are not used.
+    fn set_equation(
+        &mut self,
+        varied: &VariedRobot,
+        (model, workspace): (&Model, &mut Workspace),
+        solver: &StepSolver,
+        step: &mut StepState,
     ) {
         for (joint, acceleration) in self.acceleration.iter_mut().enumerate() {
             *acceleration = (step.x[joint] - step.v[joint]) / step.h;
@@ -90,18 +105,22 @@ impl Sensitivity {
         self.of_q.fill(0.0);
         self.of_v.copy_from_slice(&step.a);
         self.rows.fill(0.0);
-        self.add_bodies(varied, (model, workspace), step);
+        self.add_bodies(varied, (model, workspace), solver, step);
         if let Some(floor) = &varied.robot.floor {
-            self.add_contacts(floor, varied, step);
+            self.add_contacts((floor, varied), (model, workspace), step);
         }
         self.add_drives(varied, step);
-        let level = self.level;
-        dispatch_single(level, Solve { sensitivity: self, solver, step });
     }
 
     /// Subtracts the derivatives of two torques: the bodies' torque `τ(q + (1 - w) h v, v, a)` for constant
     /// acceleration, and the friction that depends on the load `τ(q + (1 - w) h v, v, 0)`.
-    fn add_bodies(&mut self, varied: &VariedRobot, (model, workspace): (&Model, &mut Workspace), step: &StepState) {
+    fn add_bodies(
+        &mut self,
+        varied: &VariedRobot,
+        (model, workspace): (&Model, &mut Workspace),
+        solver: &StepSolver,
+        step: &StepState,
+    ) {
         let dof = step.q.len();
         for ((by_load, drive), (mode, load)) in
             self.by_load.iter_mut().zip(&varied.robot.drives).zip(step.laws.modes.iter().zip(&step.loads))
@@ -142,7 +161,7 @@ impl Sensitivity {
             }
         }
         for effect in &varied.body_effects {
-            for joint in 0..dof {
+            for &joint in &solver.moving {
                 let block = &self.regressor[joint * width + 10 * effect.body..][..10];
                 self.rows[joint * self.columns + effect.column] -=
                     block.iter().zip(&effect.derivative).map(|(y, d)| y * d).sum::<f64>();
@@ -158,8 +177,10 @@ impl Sensitivity {
             let (mode, law) = (step.laws.modes[joint], &step.laws.joints[joint]);
             let own = joint * dof + joint;
             if mode.clip == Clip::Inside {
-                self.of_q[own] -= law.stiffness;
-                self.of_v[own] -= law.stiffness * weight * known * step.h;
+                // The reach moves with the joint.
+                let beyond: f64 = step.commands[joint].beyond.iter().sum();
+                self.of_q[own] -= law.stiffness * (1.0 - beyond);
+                self.of_v[own] -= law.stiffness * weight * step.h * (known - beyond);
             }
             let by_v = drive.stribeck * step.at_rest[joint] * -2.0 * step.v[joint] / drive.stribeck_speed.powi(2);
             self.of_v[own] -= drive.damping * known + mode.motion.sign() * by_v;
@@ -169,8 +190,13 @@ impl Sensitivity {
             let (mode, law, drive) = (step.laws.modes[joint], &step.laws.joints[joint], &robot.drives[joint]);
             let (x, sign, command) = (step.x[joint], mode.motion.sign(), &step.commands[joint]);
             let inside = mode.clip == Clip::Inside;
+            // Part of the torque that is at the limit in a step with a change of the command.
+            let [below, above] = command.beyond;
             let torque = match effect.quantity {
-                Quantity::Stiffness if inside => (law.pull - law.slope * x) / drive.stiffness,
+                Quantity::Stiffness if inside => {
+                    let limited = if above > below || below > 0.0 { (above - below) * drive.torque_limit } else { 0.0 };
+                    (law.pull - law.slope * x - limited) / drive.stiffness
+                }
                 Quantity::Delay if inside => -law.stiffness * command.rate,
                 Quantity::ProfileAcceleration if inside => {
                     law.stiffness * command.by_log[0] / drive.profile_acceleration
@@ -182,7 +208,7 @@ impl Sensitivity {
                 Quantity::LoadFriction => -sign * step.loads[joint].abs(),
                 Quantity::Stribeck => -sign * step.at_rest[joint],
                 Quantity::TorqueLimit => match mode.clip {
-                    Clip::Inside => 0.0,
+                    Clip::Inside => above - below,
                     Clip::Upper => 1.0,
                     Clip::Lower => -1.0,
                 },
@@ -195,11 +221,17 @@ impl Sensitivity {
     /// Adds the derivatives of the contacts' torques `Jᵀ N`. The contact force is `N = K (height - z - h J u)`: `K` is
     /// the stiffness of the floor, `z` the height of the point, `J` its derivative by the joint positions and `u` the
     /// mean velocity.
-    fn add_contacts(&mut self, floor: &Floor, varied: &VariedRobot, step: &StepState) {
+    fn add_contacts(
+        &mut self,
+        (floor, varied): (&Floor, &VariedRobot),
+        (model, workspace): (&Model, &mut Workspace),
+        step: &mut StepState,
+    ) {
         let (dof, columns) = (step.q.len(), self.columns);
         let known = 1.0 - step.end_weight;
-        let touching = step.laws.contacts.iter().zip(&step.heights).filter(|(contact, _)| contact.touches);
-        for (contact, height) in touching {
+        let points = step.laws.contacts.iter().zip(&mut step.heights).zip(&floor.points);
+        for ((contact, height), point) in points.filter(|((contact, _), _)| contact.touches) {
+            height.compute_second(model, workspace, &step.q, point);
             for other in 0..dof {
                 let turned: f64 = (0..dof).map(|k| step.mean[k] * height.second[k * dof + other]).sum();
                 let by_force = floor.stiffness * (height.first[other] + step.h * turned);

@@ -13,10 +13,10 @@ pub struct ServoSettings {
     /// Physics step of the simulator for which `export` estimates the error of its files, s. Default 0.005, the step of
     /// many tasks of Isaac Lab.
     pub physics_step_s: f64,
-    /// Maximum number of steps of the search. Default 60; fits of an SO-101 need 10 to 40.
+    /// Maximum number of steps of the search. Default 60; fits of an SO-101 need about 10.
     pub iterations: usize,
     /// Decrease of the cost in one step below which the search ends. The cost is minus twice the log-likelihood, so
-    /// random errors change it by about 1 for each parameter. Default 0.01.
+    /// random errors change it by about 1 for each parameter. Default 0.1.
     pub tolerance: f64,
     /// Length of the time periods whose errors are treated as independent for the error bars, s. Default 2: model
     /// errors of an SO-101 are correlated for up to 1 s.
@@ -35,8 +35,9 @@ pub struct ServoSettings {
     /// Relative standard deviation of each joint's stiffness, damping and armature from the common value. Default 0.1:
     /// servos of one type differ by a few per cent in gain and motor constant.
     pub deviation: f64,
-    /// Relative standard deviation of each joint's Coulomb friction from the common value. Default 1: gears of one type
-    /// differ by their wear and by the preload of their bearings.
+    /// Relative standard deviation of each joint's friction (Coulomb friction, friction per load, additional friction
+    /// at rest) from the common value. Default 1: gears of one type differ by their wear and by the preload of their
+    /// bearings.
     pub friction_deviation: f64,
     /// Relative standard deviation of each joint's torque limit from the common value. Default 1: firmware limits the
     /// torque of some joints, for example of a gripper.
@@ -67,7 +68,7 @@ impl Default for ServoSettings {
             step_s: 0.0025,
             physics_step_s: 0.005,
             iterations: 60,
-            tolerance: 0.01,
+            tolerance: 0.1,
             period_s: 2.0,
             period_freedom: 30.0,
             least_error: 4.4e-4,

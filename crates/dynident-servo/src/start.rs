@@ -4,7 +4,7 @@
 //! the natural frequency ω and the damping ratio ζ. The best combination of ω, ζ and delay on a grid gives stiffness
 //! and damping, together with the mean inertia of the joint during the motion.
 
-use crate::command::{HeldCommand, SetPoint};
+use crate::command::{HeldCommand, Reach, SetPoint};
 use crate::drive::Drive;
 use crate::parameters::{Change, FreeParameter, ServoRobot, robot_value};
 use crate::quantity::Quantity;
@@ -90,7 +90,8 @@ fn behind_profiles(run: &Run, drives: &[Drive]) -> Run {
     let times = &run.times_s;
     let commands = run.commands.iter().zip(drives).map(|(commands, drive)| {
         let mut set_point = SetPoint::new(times, commands, drive, false);
-        let mut shaped: Vec<f64> = times.windows(2).map(|pair| set_point.during(pair[0], pair[1]).mean).collect();
+        let mut shaped: Vec<f64> =
+            times.windows(2).map(|pair| set_point.during(pair[0], pair[1], Reach::UNLIMITED).mean).collect();
         shaped.extend(commands.last());
         shaped
     });
@@ -249,7 +250,7 @@ fn response_error(run: &Run, joint: usize, response: Response) -> f64 {
         let h = (run.times_s[sample] - run.times_s[sample - 1]) / parts;
         for part in 0..parts as usize {
             let from = run.times_s[sample - 1] + h * part as f64 - delay_s;
-            let pull = stiffness * (command.mean(from, from + h).0 - x);
+            let pull = stiffness * (command.mean(from, from + h, Reach::UNLIMITED).mean - x);
             v = (v + h * pull) / (1.0 + h * 2.0 * ratio * frequency + h * h * stiffness);
             x += h * v;
         }

@@ -46,11 +46,12 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
         factor(Quantity::TorqueLimit, WIDE, settings.torque_limit_deviation);
     }
     let has = |value: fn(&crate::drive::Drive) -> f64| robot.drives.iter().any(|drive| value(drive) > 0.0);
+    // Each joint has its own deviation, because friction differs between equal servos.
     if settings.load_friction && has(|drive| drive.load_friction) {
-        common_or_own(&mut list, &joints, Quantity::LoadFriction, settings.alike);
+        factor(Quantity::LoadFriction, WIDE, settings.friction_deviation);
     }
     if settings.load_friction && has(|drive| drive.stribeck) {
-        common_or_own(&mut list, &joints, Quantity::Stribeck, settings.alike);
+        factor(Quantity::Stribeck, WIDE, settings.friction_deviation);
     }
     let is_limited = |limit: fn(&crate::drive::Drive) -> f64| robot.drives.iter().all(|own| limit(own).is_finite());
     if is_limited(|drive| drive.profile_acceleration) {
@@ -71,17 +72,6 @@ pub fn unknowns(robot: &ServoRobot, settings: &ServoSettings) -> Vec<FreeParamet
     }
     body_unknowns(robot, settings, &mut list);
     list
-}
-
-/// Adds one common factor for equal servos; otherwise one factor for each joint.
-fn common_or_own(list: &mut Vec<FreeParameter>, joints: &[usize], quantity: Quantity, alike: bool) {
-    if alike {
-        common(list, joints, quantity, WIDE);
-    } else {
-        for &joint in joints {
-            common(list, &[joint], quantity, WIDE);
-        }
-    }
 }
 
 fn common(list: &mut Vec<FreeParameter>, joints: &[usize], quantity: Quantity, prior_sd: f64) {

@@ -6,6 +6,7 @@ mod laws;
 mod recovery;
 mod refused;
 mod starts;
+mod steps;
 
 use dynident_model::load_robot;
 use dynident_servo::{Drive, ServoRobot};
