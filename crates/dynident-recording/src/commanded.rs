@@ -4,6 +4,9 @@ use crate::error::{FormatError, RecordingError};
 use crate::log::{Log, LogReader, RawBlock};
 use crate::quantisation::quantisation_step;
 
+/// Resolution of the clock of recorders, s: times that differ by less are equal.
+const CLOCK_RESOLUTION_S: f64 = 1.0e-6;
+
 /// Commanded and measured positions of one log, at the recorded times.
 ///
 /// ```
@@ -73,7 +76,8 @@ impl CommandedMotion {
         let joints = self.joints.len();
         let mut later = 0;
         for sample in 0..self.samples() {
-            while later + 1 < self.samples() && self.times_s[later + 1] <= self.times_s[sample] + late_s {
+            let until_s = self.times_s[sample] + late_s + CLOCK_RESOLUTION_S;
+            while later + 1 < self.samples() && self.times_s[later + 1] <= until_s {
                 later += 1;
             }
             self.commands.copy_within(later * joints..(later + 1) * joints, sample * joints);
@@ -143,6 +147,20 @@ mod tests {
         assert_eq!(motion.positions, [1.0, 90.0, 1.0, 91.0, 2.0, 92.0].map(|q| q * degree));
         assert_eq!(motion.joint(&motion.commands, 1).collect::<Vec<_>>(), [-0.25, 0.75, 1.75]);
         assert_eq!((motion.samples(), &motion.rows[..]), (3, &[0, 1, 2][..]));
+    }
+
+    /// Times of 50 Hz are not exact sums of binary numbers; each command still belongs to the row five periods before.
+    #[test]
+    fn rounded_times_shift_all_commands_equally() {
+        let rows: String = (0..400).map(|k| format!("{},0,0,0,{k}\n", 20 * k)).collect();
+        let header = TEXT.lines().next().unwrap();
+        let (_folder, log) = log(&format!("{header}\n{rows}"), &format!("{FORMAT}command_late_s = 0.1"));
+        let motion = log.commanded_motion().unwrap();
+        let commands: Vec<f64> = motion.joint(&motion.commands, 1).collect();
+        assert!(
+            commands.windows(2).take(390).all(|two| (two[1] - two[0] - (commands[1] - commands[0])).abs() < 1e-9),
+            "{commands:?}"
+        );
     }
 
     /// A command that a recorder stamps 20 ms late belongs to the row before.

@@ -228,4 +228,6 @@ fn commands_that_are_recorded_late_are_a_problem_with_the_key() {
     study.format.as_mut().unwrap().command_late_s = Some(0.1);
     let corrected = found(&study);
     assert!(corrected.problems.is_empty(), "{:?}", corrected.problems);
+    let drive = &corrected.drives[0];
+    assert!((drive.delay_s - drive.read_delay_s - 0.02).abs() < 0.001, "{drive:?}");
 }

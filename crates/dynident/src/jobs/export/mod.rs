@@ -13,7 +13,7 @@ pub use validation::{
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::jobs::violations::violations;
-use crate::result::{FormResult, ResultFile, ValueSource};
+use crate::result::{FormResult, JointResult, ResultFile, TermResult, ValueSource};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{
     CodeOptions, ControllerBrand, ExportError, Exported, PayloadBody, RobotModel, Target, export_with,
@@ -161,7 +161,21 @@ fn reservations(stored: &ResultFile) -> Vec<String> {
         notes.push(format!("The arm without its payloads ({}).", names.join(", ")));
     }
     notes.extend(value_sources(stored));
+    notes.extend(drives_in_sums(stored));
     notes
+}
+
+/// Friction and drive parameters that the logs determine only in a sum with values of bodies.
+fn drives_in_sums(stored: &ResultFile) -> Option<String> {
+    let of_joint = |joint: &JointResult| {
+        let is_in_sum = |term: &&TermResult| term.std.is_none() && term.base_parameter.is_some();
+        let terms = joint.terms.iter().filter(is_in_sum);
+        terms.map(|term| format!("{} of {}", term.symbol, joint.name)).collect::<Vec<_>>()
+    };
+    let all: Vec<String> = stored.joints.iter().flat_map(of_joint).collect();
+    (!all.is_empty()).then(|| {
+        format!("Known only in a sum with values of bodies, so the separate value may be wrong: {}.", all.join(", "))
+    })
 }
 
 /// Which values of the bodies were measured, and which only in sums; `None` for a result of an earlier version.
