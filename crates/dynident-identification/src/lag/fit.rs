@@ -108,8 +108,16 @@ struct Samples<'a> {
     unknowns: Unknowns<'a>,
     rows: Vec<Vec<DelayRows>>,
     lag_s: Vec<f64>,
-    /// Prior standard deviation of the times of reversal, s; `None` if they are not estimated.
-    reversal: Option<f64>,
+    /// `None` if the times of reversal are not estimated.
+    reversals: Option<ReversalPrior>,
+}
+
+struct ReversalPrior {
+    /// Standard deviation of the times of reversal around zero, s.
+    std_s: f64,
+    /// Standard deviations of the joints' residuals, N m (N). The rows are divided by them, because the prior assumes
+    /// rows with unit noise.
+    joint_sigma: Vec<f64>,
 }
 
 /// Fits the lags of the joints, which are common to all logs. `noise` states whether logs have separate noise levels.
@@ -180,14 +188,19 @@ fn fitted(
         Ok(())
     };
     repeated(&mut samples)?;
-    samples.reversal = Some(f64::INFINITY);
+    samples.reversals = Some(ReversalPrior { std_s: f64::INFINITY, joint_sigma: vec![1.0; dof] });
     let free = estimated(&samples)?;
-    samples.reversal = reversal::spread_s(&free, first + dof, settings.thresholds.lag.max_reversal_std);
-    if samples.reversal.is_some() {
+    let spread_s = reversal::spread_s(&free, first + dof, settings.thresholds.lag.max_reversal_std);
+    samples.reversals = spread_s.map(|std_s| ReversalPrior { std_s, joint_sigma: free.joint_sigma });
+    if samples.reversals.is_some() {
         repeated(&mut samples)?;
     }
-    let last = estimated(&samples)?;
-    let reversals = samples.reversal.map_or_else(Vec::new, |_| reversal::of_joints(&last, first + dof));
+    let mut last = estimated(&samples)?;
+    let mut reversals = Vec::new();
+    if let Some(prior) = &samples.reversals {
+        reversals = reversal::of_joints(&last, first + dof);
+        last.joint_sigma.iter_mut().zip(&prior.joint_sigma).for_each(|(sigma, unit)| *sigma *= unit);
+    }
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
@@ -208,7 +221,7 @@ impl<'a> Samples<'a> {
             (0..lag_s.len()).into_par_iter().map(of_joint).collect()
         };
         let rows = checks.par_iter().map(of_log).collect::<Result<_, _>>()?;
-        Ok(Self { checks, with, unknowns, rows, lag_s, reversal: None })
+        Ok(Self { checks, with, unknowns, rows, lag_s, reversals: None })
     }
 
     /// Computes the rows again if the lag is no longer between the samples (nodes) that they interpolate.
@@ -260,7 +273,7 @@ impl<'a> Samples<'a> {
         let model = self.checks[0].model();
         let layout = model.layout();
         let (first, dof) = (self.unknowns.count(), self.lag_s.len());
-        let reversals = if self.reversal.is_some() { dof } else { 0 };
+        let reversals = if self.reversals.is_some() { dof } else { 0 };
         let columns = first + dof + reversals;
         let names = (0..columns).map(|column| format!("column {column}")).collect();
         let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
@@ -268,13 +281,13 @@ impl<'a> Samples<'a> {
         let mut fallback = self.unknowns.values.to_vec();
         fallback.resize(columns, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
-        if let Some(prior_s) = self.reversal.filter(|prior_s| prior_s.is_finite()) {
+        if let Some(prior) = self.reversals.as_ref().filter(|prior| prior.std_s.is_finite()) {
             let information =
                 DMatrix::from_fn(
                     dof,
                     columns,
                     |row, column| {
-                        if column == first + dof + row { prior_s.recip() } else { 0.0 }
+                        if column == first + dof + row { prior.std_s.recip() } else { 0.0 }
                     },
                 );
             problem = problem.with_prior(vec![0.0; columns], information)?;
@@ -306,6 +319,9 @@ impl<'a> Samples<'a> {
                 problem.add(&format!("log {number}"), joint, columns, mapped)?;
             }
         }
-        Ok(problem)
+        let Some(prior) = &self.reversals else { return Ok(problem) };
+        problem.with_log_weights(
+            |_, joint| if prior.joint_sigma[joint] > 0.0 { prior.joint_sigma[joint].recip() } else { 1.0 },
+        )
     }
 }
