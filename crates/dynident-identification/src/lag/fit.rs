@@ -188,22 +188,32 @@ fn fitted(
         Ok(())
     };
     repeated(&mut samples)?;
+    let lags_by = |samples: &Samples<'_>, last: &Estimate| -> Vec<Option<TorqueLag>> {
+        (0..dof).map(|joint| samples.joint_lag(last, first + joint, longest_s, fastest_hz)).collect()
+    };
+    let row_counts = |samples: &Samples<'_>| -> Vec<usize> {
+        let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
+        (0..dof).map(of_joint).collect()
+    };
+    let mut last = estimated(&samples)?;
+    let (mut joints, mut rows) = (lags_by(&samples, &last), row_counts(&samples));
+    let mut reversals = Vec::new();
     samples.reversals = Some(ReversalPrior { std_s: f64::INFINITY, joint_sigma: vec![1.0; dof] });
     let free = estimated(&samples)?;
     let spread_s = reversal::spread_s(&free, first + dof, settings.thresholds.lag.max_reversal_std);
-    samples.reversals = spread_s.map(|std_s| ReversalPrior { std_s, joint_sigma: free.joint_sigma });
-    if samples.reversals.is_some() {
+    if let Some(std_s) = spread_s {
+        samples.reversals = Some(ReversalPrior { std_s, joint_sigma: free.joint_sigma.clone() });
         repeated(&mut samples)?;
+        let mut separated = estimated(&samples)?;
+        separated.joint_sigma.iter_mut().zip(&free.joint_sigma).for_each(|(sigma, unit)| *sigma *= unit);
+        let lags = lags_by(&samples, &separated);
+        // If the samples do not distinguish the two at some joint, its lag diverges.
+        let is_held = |joint: usize| separated.rank.fixed.iter().any(|fixed| fixed.column == first + joint);
+        if lags.iter().enumerate().all(|(joint, lag)| lag.is_some() || is_held(joint)) {
+            reversals = reversal::of_joints(&separated, first + dof);
+            (last, joints, rows) = (separated, lags, row_counts(&samples));
+        }
     }
-    let mut last = estimated(&samples)?;
-    let mut reversals = Vec::new();
-    if let Some(prior) = &samples.reversals {
-        reversals = reversal::of_joints(&last, first + dof);
-        last.joint_sigma.iter_mut().zip(&prior.joint_sigma).for_each(|(sigma, unit)| *sigma *= unit);
-    }
-    let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
-    let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
-    let rows = (0..dof).map(of_joint).collect();
     let usual_lag_s = own.seconds(settings.thresholds.lag.prior_std_s);
     let (parameters, thresholds) = (unknowns.values.len(), settings.thresholds.lag);
     Ok(LagFit { last, parameters, first, joints, reversals, rows, usual_lag_s, thresholds })
