@@ -152,9 +152,9 @@ mod tests {
     /// Times of 50 Hz are not exact sums of binary numbers; each command still belongs to the row five periods before.
     #[test]
     fn rounded_times_shift_all_commands_equally() {
-        let rows: String = (0..400).map(|k| format!("{},0,0,0,{k}\n", 20 * k)).collect();
+        let rows: Vec<String> = (0..400).map(|k| format!("{},0,0,0,{k}", 20 * k)).collect();
         let header = TEXT.lines().next().unwrap();
-        let (_folder, log) = log(&format!("{header}\n{rows}"), &format!("{FORMAT}command_late_s = 0.1"));
+        let (_folder, log) = log(&format!("{header}\n{}\n", rows.join("\n")), &format!("{FORMAT}command_late_s = 0.1"));
         let motion = log.commanded_motion().unwrap();
         let commands: Vec<f64> = motion.joint(&motion.commands, 1).collect();
         assert!(
