@@ -113,7 +113,7 @@ struct Samples<'a> {
 }
 
 struct ReversalPrior {
-    /// Standard deviation of the times of reversal around zero, s.
+    /// Standard deviation of the times of reversal around zero, s; infinite for times without prior.
     std_s: f64,
     /// Standard deviations of the joints' residuals, N m (N). The rows are divided by them, because the prior assumes
     /// rows with unit noise.
@@ -292,14 +292,8 @@ impl<'a> Samples<'a> {
         fallback.resize(columns, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
         if let Some(prior) = self.reversals.as_ref().filter(|prior| prior.std_s.is_finite()) {
-            let information =
-                DMatrix::from_fn(
-                    dof,
-                    columns,
-                    |row, column| {
-                        if column == first + dof + row { prior.std_s.recip() } else { 0.0 }
-                    },
-                );
+            let mut information = DMatrix::zeros(dof, columns);
+            information.view_mut((0, first + dof), (dof, dof)).fill_diagonal(prior.std_s.recip());
             problem = problem.with_prior(vec![0.0; columns], information)?;
         }
         for (number, (check, rows)) in self.checks.iter().zip(&self.rows).enumerate() {
@@ -330,8 +324,6 @@ impl<'a> Samples<'a> {
             }
         }
         let Some(prior) = &self.reversals else { return Ok(problem) };
-        problem.with_log_weights(
-            |_, joint| if prior.joint_sigma[joint] > 0.0 { prior.joint_sigma[joint].recip() } else { 1.0 },
-        )
+        problem.with_log_weights(|_, joint| prior.joint_sigma[joint].recip())
     }
 }

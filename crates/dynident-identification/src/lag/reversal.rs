@@ -19,6 +19,8 @@ pub(crate) struct Reversal {
     pub(crate) joint: usize,
     /// The time, s; negative if the friction changes its sign first.
     pub(crate) late_s: f64,
+    /// Standard deviation of a normal error with the same 95 % interval, s. It is larger than that of the estimate if
+    /// there are few time segments.
     pub(crate) std_s: f64,
 }
 
@@ -71,7 +73,7 @@ mod tests {
         assert_eq!(spread_of(&times(&[1e-3, -1e-3, 1e-3, -1e-3, 1e-3, 1e-3], 1e-3), 4.0), None);
         let spread_s = spread_of(&times(&[2e-3; 6], 1e-3), 4.0).unwrap();
         // 6 · 4 / (1 + s²) = 6 in ms.
-        assert!((spread_s - 3e-3_f64.sqrt() * 1e-3_f64.sqrt()).abs() < 1e-9, "{spread_s}");
+        assert!((spread_s - 3.0_f64.sqrt() * 1e-3).abs() < 1e-9, "{spread_s}");
         assert_eq!(spread_of(&[], 4.0), None);
     }
 

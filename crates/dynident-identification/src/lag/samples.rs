@@ -19,6 +19,8 @@ const MAX_KEPT_VALUES: usize = 8_000_000;
 pub(crate) struct DelayCheck<'a> {
     model: &'a RegressorModel,
     theta: &'a [f64],
+    /// `theta` with zeros except for friction that has a sign function.
+    step_theta: Vec<f64>,
     pieces: Vec<Piece>,
     samples: usize,
     numbers: usize,
@@ -30,7 +32,10 @@ pub(crate) struct DelayCheck<'a> {
 impl<'a> DelayCheck<'a> {
     pub(crate) fn new(model: &'a RegressorModel, theta: &'a [f64]) -> Self {
         let (pieces, buffer) = (Vec::new(), Vec::new());
-        Self { model, theta, pieces, samples: 0, numbers: 0, full: false, rate_hz: 0.0, buffer }
+        let has_step = |column: &Column| matches!(column, Column::Term(term) if term.step_width().is_some());
+        let columns = model.layout().columns().iter().zip(theta);
+        let step_theta = columns.map(|(column, value)| if has_step(column) { *value } else { 0.0 }).collect();
+        Self { model, theta, step_theta, pieces, samples: 0, numbers: 0, full: false, rate_hz: 0.0, buffer }
     }
 
     pub(super) fn take_filtered(&mut self, rows: &JointRows<'_>) {
@@ -59,7 +64,7 @@ impl<'a> DelayCheck<'a> {
             let panel = samples.panels.joint(joint);
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
             piece.model[joint].extend_from_slice(&self.buffer);
-            step_torque(self.model, panel, joint, self.theta, &mut self.buffer);
+            predicted_torque(panel, rows, columns, &self.step_theta, &mut self.buffer);
             piece.step[joint].extend_from_slice(&self.buffer);
             piece.measured[joint].extend_from_slice(&panel[columns.len() * rows..]);
             piece.leave_out(joint, samples.set_aside.get(joint).map_or(&[], Vec::as_slice));
@@ -108,20 +113,5 @@ impl<'a> DelayCheck<'a> {
         let columns = self.model.layout().joint_columns(joint).len();
         let filter = logs.filter.decimation(self.rate_hz, motion_band_hz(&logs.motion));
         DelayRows::new(&self.pieces, joint, columns, self.rate_hz, filter.as_ref(), shift, settings.segments)
-    }
-}
-
-/// Computes the torque that the friction with a sign function predicts for the rows of one joint, one value per row.
-fn step_torque(model: &RegressorModel, panel: &[f64], joint: usize, theta: &[f64], out: &mut [f64]) {
-    let rows = out.len();
-    out.fill(0.0);
-    let layout = model.layout();
-    for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
-        let Column::Term(term) = &layout.columns()[column] else { continue };
-        if term.step_width().is_some() {
-            for (to, x) in out.iter_mut().zip(&panel[place * rows..(place + 1) * rows]) {
-                *to += theta[column] * x;
-            }
-        }
     }
 }
