@@ -201,7 +201,7 @@ fn parted(message: &str) -> (Vec<String>, Vec<Number>) {
     (words, numbers)
 }
 
-/// Length of an exponent such as `e-4` at the beginning of a text; 0 if there is none.
+/// Length of an exponent such as `e-4` at the beginning of a text; 0 without an exponent.
 fn exponent_length(text: &str) -> usize {
     let Some(power) = text.strip_prefix('e') else { return 0 };
     let unsigned = power.strip_prefix('-').unwrap_or(power);

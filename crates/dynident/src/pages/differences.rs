@@ -30,17 +30,18 @@ pub fn difference_words(r: &ResultFile) -> Vec<String> {
     if !others.is_empty() {
         words.push(format!("It could also be: {}", others.join("; or ")));
     }
-    if found.is_followed {
-        words.push(
+    let of_model = match (found.is_followed, is_certain) {
+        (true, _) => {
             "The exported model follows this; the other bodies keep the values of the robot description within its tolerance"
-                .to_owned(),
-        );
-    } else {
-        words.push(
+        }
+        (false, true) => {
+            "The exported model predicts the torque, but it may spread this change over several bodies, because the logs do not locate it well enough"
+        }
+        (false, false) => {
             "The logs do not show which bodies differ; the exported model predicts the torque, but single masses may be wrong"
-                .to_owned(),
-        );
-    }
+        }
+    };
+    words.push(of_model.to_owned());
     if is_certain || found.is_followed {
         words.extend(best.parts.iter().filter_map(|part| edit_test(found, part)));
     }

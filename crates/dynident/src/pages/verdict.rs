@@ -70,7 +70,7 @@ pub(super) fn verdict(r: &ResultFile) -> Text {
     text.point(Tone::Plain, next_step(r, is_usable))
 }
 
-/// Held-out error, what was compared, and the error of the robot description.
+/// Held-out error with its frequency band, and the error of the robot description.
 fn headline(r: &ResultFile) -> String {
     let Some(first) = r.validation.first() else {
         return "No log was held out, so the error of this model on other motion is not known.".to_owned();
