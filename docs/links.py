@@ -26,7 +26,7 @@ def decision(file):
 
 def converted(text, repository):
     """Text of a page with the links of the built book."""
-    text = re.sub(r"\]\((\d{4}-[^)#]*\.md)\)", lambda found: f"](decisions.md#{decision(found[1])})", text)
+    text = re.sub(r"\]\((?:\.\./\.\./docs/decisions/)?(\d{4}-[^)#]*\.md)\)", lambda found: f"](decisions.md#{decision(found[1])})", text)
     text = text.replace("](../src/", "](")
     return re.sub(r"\]\(\.\./\.\./([^)]*)\)", lambda found: f"]({repository}/blob/main/{found[1]})", text)
 

@@ -162,7 +162,9 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
             let outside =
                 link.starts_with("https://") || link.starts_with('#') || (page == "SUMMARY.md" && link.is_empty());
             let file = link.split('#').next().unwrap_or(link);
-            assert!(outside || source.join(file).is_file(), "{page}: `{link}` leads nowhere");
+            // docs/links.py leads links with `../../` to the repository. The built book holds no other files.
+            let file_exists = source.join(file).is_file() && (!file.starts_with("../") || file.starts_with("../../"));
+            assert!(outside || file_exists, "{page}: `{link}` leads nowhere");
         }
     }
     let summary = &pages.iter().find(|(page, _)| page == "SUMMARY.md").expect("the book has a summary").1;
