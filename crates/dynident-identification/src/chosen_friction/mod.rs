@@ -3,6 +3,7 @@
 mod choice;
 mod constants;
 mod passes;
+mod starts;
 
 pub use choice::{ChosenFriction, choose_friction};
 
