@@ -1,7 +1,7 @@
 //! Search for the best number of a mistake, and for the range of numbers that the logs do not distinguish from it.
 
 use super::hypothesis::{CorrectedStudy, Explained, Hypothesis};
-use super::mistakes::Mistake;
+use super::mistakes::{Mistake, Number};
 use super::step_width::with_widths;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
@@ -30,14 +30,23 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
         None => hypothesis.lower_bound(),
     };
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
-    let found = at.without(&last.with_best_number(free)?).explained(consistency).ok()?;
     // A free number partly fits the noise. Therefore a round number is kept unless the free number is clearly better.
-    let is_better = if facts.number.is_none_or(|number| number.is_round) {
-        found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
-    } else {
-        value(&found.hypothesis) < value(&first.hypothesis)
+    let is_better = |found: &Explained| {
+        if facts.number.is_none_or(|number| number.is_round) {
+            found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
+        } else {
+            value(&found.hypothesis) < value(&first.hypothesis)
+        }
     };
-    is_better.then_some(found)
+    let better = last.with_best_number(free).and_then(|better| at.without(&better).explained(consistency).ok());
+    let better = better.filter(is_better);
+    if !facts.is_other_rate {
+        return better;
+    }
+    let mut best = better.unwrap_or_else(|| first.clone());
+    let last = best.hypothesis.mistakes.last()?;
+    best.hypothesis.factors_alike = factor_range(last, 2.0 * at.settings.score.min_gain, free);
+    Some(best)
 }
 
 /// The hypothesis with the best unit of positions. For each unit, the widths of the smoothed friction signs are fitted
@@ -87,10 +96,9 @@ fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistak
     found.map_or(f64::INFINITY, |found| found.lower_bound())
 }
 
-/// Smallest and largest position factor around that of `mistake` for which `value` increases by at most `max_increase`.
+/// Smallest and largest factor around that of `mistake` for which `value` increases by at most `max_increase`.
 fn factor_range(mistake: &Mistake, max_increase: f64, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
-    let facts = mistake.facts();
-    let (factor, reach) = (facts.position_factor?, facts.number?.reach);
+    let Number { at: factor, reach, .. } = mistake.facts().number?;
     let at = |log: f64| value(&mistake.with_number(factor * log.exp()));
     let limit = at(0.0) + max_increase;
     let edge = |direction: f64| {

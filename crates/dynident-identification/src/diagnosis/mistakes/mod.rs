@@ -22,7 +22,7 @@ pub mod torque_unit;
 pub use study_keys::{KeyChange, StudyKeys};
 
 pub(super) use kind::{Breadth, Proof, Setup, TorqueSource};
-pub(super) use numbers::ternary_search;
+pub(super) use numbers::{Number, ternary_search};
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;

@@ -3,11 +3,13 @@
 /// Number of grid points before refinement. There are several because the residual has local minima between gear
 /// ratios.
 const GRID_POINTS: usize = 17;
+/// Maximum ratio between the ends of a range of factors that is reported as a single factor.
+pub(super) const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
 
 /// Free number of a mistake, with its search range.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) struct Number {
-    pub(super) at: f64,
+    pub(in crate::diagnosis) at: f64,
     /// Half-width of the search range; for a factor, half-width of its logarithm.
     pub(in crate::diagnosis) reach: f64,
     pub(super) is_factor: bool,

@@ -4,6 +4,7 @@ use crate::result::StudyChange;
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{Mistake, StudyKeys};
+use dynident_recording::LogFormat;
 
 /// Keys for the first training log; `None` for a study without training logs.
 pub(super) fn keys_of_study(study: &Study, robot: &StudyRobot) -> Option<StudyKeys> {
@@ -33,4 +34,84 @@ pub(super) fn keys_of_log(study: &Study, robot: &StudyRobot, index: usize) -> St
 pub(super) fn changes(mistake: &Mistake, keys: Option<&StudyKeys>) -> Vec<StudyChange> {
     let changes = keys.map_or_else(Vec::new, |keys| mistake.changes(keys));
     changes.into_iter().map(StudyChange::from).collect()
+}
+
+/// Key changes that correct mistakes one after the other, and the keys before the last mistake. A later line for the
+/// same key contains the earlier correction, and a comment says so.
+pub(super) fn successive_changes(
+    mistakes: &[Mistake],
+    keys: Option<&StudyKeys>,
+) -> (Vec<Vec<StudyChange>>, Option<StudyKeys>) {
+    let mut all: Vec<Vec<StudyChange>> = Vec::new();
+    let (mut now, mut before) = (keys.cloned(), keys.cloned());
+    for mistake in mistakes {
+        let mut found = changes(mistake, now.as_ref());
+        before.clone_from(&now);
+        now = now.map(|keys| found.iter().fold(keys, with_change));
+        for change in &mut found {
+            if all.iter().flatten().any(|earlier| key_of(earlier) == key_of(change)) {
+                change.line += "   # in place of the line above, which it contains";
+            }
+        }
+        all.push(found);
+    }
+    (all, before)
+}
+
+fn key_of(change: &StudyChange) -> (&str, &str) {
+    (&change.table, change.line.split('=').next().unwrap_or_default().trim())
+}
+
+/// The keys after a change of the log format; unchanged for other keys, and for a change that only a person can make.
+fn with_change(keys: StudyKeys, change: &StudyChange) -> StudyKeys {
+    let format = || -> Option<LogFormat> {
+        let path = change.table.strip_prefix(&keys.table)?;
+        let mut format = toml::Table::try_from(&keys.format).ok()?;
+        let table = match path.strip_prefix('.') {
+            Some(group) => format.get_mut(group)?.as_table_mut()?,
+            None => &mut format,
+        };
+        table.extend(change.line.parse::<toml::Table>().ok()?);
+        format.try_into().ok()
+    };
+    match format() {
+        Some(format) => StudyKeys { format, ..keys },
+        None => keys,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_identification::diagnosis::{Channels, Order, Sign};
+
+    /// Joints a, b, c, d are logged as b, a, d, c, and the sign of two torques is reversed.
+    #[test]
+    fn later_corrections_of_a_key_contain_the_earlier_ones() {
+        let format = "rate_hz = 100.0\nposition = { columns = [4, 5, 6, 7] }\n\
+                      torque = { columns = \"t{1..4}\", sign = [1, -1, 1, 1] }";
+        let keys = StudyKeys {
+            format: toml::from_str(format).unwrap(),
+            table: "format".to_owned(),
+            places: vec![0, 1, 2, 3],
+            columns: 4,
+            torque_lag_s: None,
+            has_base_rotation: false,
+        };
+        let order = |order: [usize; 4]| Order { order: order.to_vec(), channels: Channels::Both }.into();
+        let sign = |joint: usize| Sign { joints: vec![joint], channels: Channels::Torque }.into();
+        let mistakes = [order([1, 0, 2, 3]), sign(0), order([0, 1, 3, 2]), sign(3)];
+        let (found, before) = successive_changes(&mistakes, Some(&keys));
+        let lines = |number: usize| -> Vec<&str> {
+            found[number].iter().map(|change| change.line.split("   #").next().unwrap()).collect()
+        };
+        assert_eq!(lines(0), ["columns = [5, 4, 6, 7]", "columns = [\"t2\", \"t1\", \"t3\", \"t4\"]"]);
+        assert_eq!(lines(1), ["sign = [-1, -1, 1, 1]"]);
+        assert_eq!(lines(2), ["columns = [5, 4, 7, 6]", "columns = [\"t2\", \"t1\", \"t4\", \"t3\"]"]);
+        assert_eq!(lines(3), ["sign = [-1, -1, 1, -1]"]);
+        let is_noted = |number: usize| found[number].iter().all(|change| change.line.contains("in place of"));
+        assert_eq!([0, 1, 2, 3].map(is_noted), [false, false, true, true]);
+        let columns = before.unwrap().format.position.column_list("columns").unwrap();
+        assert_eq!(format!("{columns:?}"), "[Index(5), Index(4), Index(7), Index(6)]");
+    }
 }
