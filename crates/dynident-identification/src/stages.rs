@@ -15,7 +15,7 @@ use crate::examination::{
     sign_evidence, tested_on,
 };
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
-use crate::task::IdentificationTask;
+use crate::task::{IdentificationTask, logs_without_payload};
 use crate::training::Training;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
@@ -178,7 +178,8 @@ impl Stage<'_> {
             DiagnosisChoice::WhenDoubtful if !self.is_doubted(examined, robot) => Ok(None),
             DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
                 let theta = plain.filter(|_| own_terms);
-                Ok(Some(diagnose(DiagnosisTask { logs, settings, robot, training: chosen, theta })?))
+                let bare = logs_without_payload(logs.recordings, chosen);
+                Ok(Some(diagnose(DiagnosisTask { logs, settings, robot, training: &bare, theta })?))
             }
         }
     }

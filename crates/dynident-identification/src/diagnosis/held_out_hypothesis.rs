@@ -136,6 +136,22 @@ pub(super) fn held_out_hypothesis(
     };
     let mut tried: Vec<Candidate> = all.into_par_iter().map(without).collect();
     tried.sort_by(|a, b| a.score().total_cmp(&b.score()));
+    if std::env::var("DBGH").is_ok() {
+        eprintln!(
+            "as written {} rms {} left {:?} trained {:?}",
+            as_written.score, as_written.rms, as_written.left, as_written.trained
+        );
+        for one in tried.iter().take(4) {
+            eprintln!(
+                "  {:?} score {} rms {} left {:?} clear {}",
+                one.mistake,
+                one.score(),
+                one.residual.rms,
+                one.residual.left,
+                one.is_clear(&as_written, settings)
+            );
+        }
+    }
     let least = tried.first().map_or(f64::INFINITY, Candidate::score);
     let late = lag_search.and_then(|lag_search| late_torque(known, lag_search));
     let late = late.filter(|late| late.score() < least && late.is_clear(&as_written, settings));

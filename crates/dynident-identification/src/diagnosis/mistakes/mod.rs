@@ -22,7 +22,7 @@ pub mod torque_unit;
 pub use study_keys::{KeyChange, StudyKeys};
 
 pub(super) use kind::{Breadth, Proof, Setup, TorqueSource};
-pub(super) use numbers::{Number, ternary_search};
+pub(super) use numbers::ternary_search;
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
@@ -132,6 +132,11 @@ impl Mistake {
     /// The mistake with the number nearby that gives the smallest `value`; `None` without a free number.
     pub(super) fn with_best_number(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
         self.kind().with_best_number(&value)
+    }
+
+    /// The mistake with the exact unit nearest to its number; `None` if no unit is near.
+    pub(super) fn nearest_unit(&self) -> Option<Self> {
+        self.kind().nearest_unit()
     }
 
     pub(super) fn torques_alone(&self) -> Option<Vec<TorqueSource>> {

@@ -5,6 +5,9 @@
 const GRID_POINTS: usize = 17;
 /// Maximum ratio between the ends of a range of factors that is reported as a single factor.
 pub(super) const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
+/// Minimum logarithm of the ratio between a free factor and a unit; a free factor that is nearer does not replace the
+/// unit.
+pub(super) const MIN_LOG_RATIO_TO_UNIT: f64 = 0.1;
 
 /// Free number of a mistake, with its search range.
 #[derive(Clone, Copy, Debug)]

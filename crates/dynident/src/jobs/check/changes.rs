@@ -36,6 +36,20 @@ pub(super) fn changes(mistake: &Mistake, keys: Option<&StudyKeys>) -> Vec<StudyC
     changes.into_iter().map(StudyChange::from).collect()
 }
 
+/// Key changes that correct a mistake of log number `index` only. A log that uses the common format gets a complete
+/// format of its own.
+pub(super) fn changes_of_log(mistake: &Mistake, study: &Study, keys: &StudyKeys, index: usize) -> Vec<StudyChange> {
+    let found = changes(mistake, Some(keys));
+    let corrected = found.iter().fold(keys.clone(), with_change).format;
+    let is_of_format = found.iter().all(|change| change.table.starts_with(&keys.table)) && corrected != keys.format;
+    match toml::Value::try_from(&corrected) {
+        Ok(format) if is_of_format && study.log[index].format.is_none() => {
+            vec![StudyChange { table: format!("[[log]] {}", index + 1), line: format!("format = {format}") }]
+        }
+        _ => found,
+    }
+}
+
 /// Key changes that correct mistakes one after the other, and the keys before the last mistake. A later line for the
 /// same key contains the earlier correction, and a comment says so.
 pub(super) fn successive_changes(
