@@ -20,7 +20,7 @@ use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
 use dynident_identification::{Condition, CutoffByError, DriveInertiaChoice, LogEvent, LogVariation, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
-use dynident_study::JointDrive;
+use dynident_study::{JointDrive, ReportThresholds};
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema. Within a version fields are added, never renamed.
@@ -37,6 +37,10 @@ pub struct ResultFile {
     /// Reasons not to load the exported model into a robot; empty if there are none.
     #[serde(default)]
     pub problems: Vec<String>,
+    /// Thresholds of the statements about this result, as `[thresholds.report]` of the study gives them; omitted if all
+    /// have their default values.
+    #[serde(default, skip_serializing_if = "ReportThresholds::is_default")]
+    pub thresholds: ReportThresholds,
     /// Provenance; null in results of versions before 0.1.
     #[serde(default)]
     pub provenance: Option<Provenance>,

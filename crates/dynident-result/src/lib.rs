@@ -43,6 +43,7 @@ pub use comparison::{
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
+pub use dynident_study::{DifferenceSettings, ProblemSettings, ReportThresholds, TorqueErrorSettings};
 pub use error::ResultFileError;
 pub use error_terms::ErrorTermResult;
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
@@ -65,7 +66,6 @@ pub use iterations::{
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
 pub use poorly_known::{POORLY_KNOWN_PERCENT, ParameterKind, PoorlyKnown};
-pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use read::{MAX_RESULT_BYTES, read_result};
 pub use servo::{SERVO_SCHEMA, ServoBody, ServoDrive, ServoFile, ServoLog, ServoMotion, ServoNumber, ServoScale};
@@ -73,7 +73,7 @@ pub use servo_design::{SERVO_DESIGN_SCHEMA, ServoDesignFile, ServoForecast, Serv
 pub use servo_form::{ServoForm, ServoFormLog};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 pub use test_samples::{TEST_SAMPLES_SCHEMA, TestSamplesFile, TestedLog};
-pub use torque_errors::{FormatError, JointError, TorqueErrorSettings};
+pub use torque_errors::{FormatError, JointError};
 // Types of lower crates in these files.
 pub use dynident_excitation::check::LimitReport;
 pub use dynident_identification::ErrorSource;

@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if context.json {
         terminal::print_document(&json(&file)?)?;
     } else {
-        terminal::print(&summary::validation(&file.validation, &file.logs))?;
+        terminal::print(&summary::validation(&file.validation, &file.logs, &stored.thresholds.errors))?;
     }
     show_problems(&file.problems, "");
     let within = judged(&file.validation, options.max_validation_error);

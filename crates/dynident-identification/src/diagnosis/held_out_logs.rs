@@ -39,7 +39,7 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Re
     let (robot, settings) = (&trained.model.parametric, trained.settings);
     let mut found = HeldOutLogs::default();
     for log in logs.of_role(Role::Validate) {
-        let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
+        let samples = [MotionSamples::of_recording(logs, trained.model, log, &settings.motion)?];
         let rows = samples[0].instants(INSTANTS);
         if repeats_motion(trained.rows, &rows, &settings.held_out) {
             found.repeated_motions.push(log);

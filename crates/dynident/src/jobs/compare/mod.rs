@@ -227,7 +227,8 @@ fn between(
     let (model, names, rows) = known_rows(&robot, bodies, common).map_err(|error| failed(error.to_string()))?;
     let (old, old_covariance) = estimate(first, first_path, &names)?;
     let (new, new_covariance) = estimate(result, path, &names)?;
-    let found = Differences::between(&model, &rows, [(&old, &old_covariance), (&new, &new_covariance)]);
+    let limits = DescriptionThresholds::default();
+    let found = Differences::between(&model, &rows, [(&old, &old_covariance), (&new, &new_covariance)], &limits);
     let found = found.map_err(|error| failed(error.to_string()))?;
     Ok(changes_of(&found, &model, (index, Some(0)), rows.len()))
 }
@@ -243,8 +244,8 @@ fn from_description(result: &ResultFile, path: &Path, common: &[&str]) -> Result
     let (model, names, rows) = known_rows(&robot, priors.into_iter().flatten().collect(), &described)
         .map_err(|error| failed(error.to_string()))?;
     let (values, covariance) = estimate(result, path, &names)?;
-    let knowledge = ConsistencySettings::default();
-    let found = Differences::from_description(&model, &rows, &values, &covariance, &knowledge);
+    let (knowledge, limits) = (ConsistencySettings::default(), DescriptionThresholds::default());
+    let found = Differences::from_description(&model, &rows, &values, &covariance, &knowledge, &limits);
     let found = found.map_err(|error| failed(error.to_string()))?;
     Ok(found.map(|found| changes_of(&found, &model, (0, None), rows.len())))
 }

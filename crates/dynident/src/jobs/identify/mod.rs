@@ -333,6 +333,7 @@ fn result_file(
         schema: RESULT_SCHEMA.to_owned(),
         name: parts.name,
         problems: Vec::new(),
+        thresholds: study.thresholds.report.clone(),
         provenance: Some(parts.provenance),
         robot: robot_summary(robot),
         method: method_summary(study, found),
