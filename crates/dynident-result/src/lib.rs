@@ -12,14 +12,17 @@ mod evaluation;
 mod export;
 mod export_validation;
 mod factors;
+mod fit;
 mod forms;
 mod grouped;
 mod identification;
 mod inspection;
 mod iterations;
 mod log;
+mod method;
 mod new_study;
 mod numbers;
+mod parameters;
 mod poorly_known;
 mod problems;
 mod provenance;
@@ -50,13 +53,10 @@ pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use export_validation::{EXPORT_VALIDATION_SCHEMA, ExportValidationFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
+pub use fit::{PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, TrainingErrors, TrainingJoint, TrainingResult};
 pub use forms::{FormError, FormJointError, FormResult, FormTerm, StoredModel};
 pub use grouped::{FindingGroup, grouped_check_findings, grouped_findings};
-pub use identification::{
-    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
-    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
-    Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
-};
+pub use identification::{RESULT_SCHEMA, ResultFile};
 pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
@@ -64,7 +64,11 @@ pub use iterations::{
     INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetConditionEntry,
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
+pub use method::{LogSummary, MethodSummary, RobotSummary, Timings};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
+pub use parameters::{
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, TermResult, ValueSource,
+};
 pub use poorly_known::{POORLY_KNOWN_PERCENT, ParameterKind, PoorlyKnown};
 pub use provenance::{InputFile, Provenance};
 pub use read::{MAX_RESULT_BYTES, read_result};
