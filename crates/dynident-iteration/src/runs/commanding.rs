@@ -128,28 +128,35 @@ impl Iteration {
         if observed {
             supervisor.ended(&robot_run);
         }
+        Ok(MotionOutcome::of(robot_run, plan.run))
+    }
+}
+
+impl MotionOutcome {
+    /// Outcome of a motion of run number `run`.
+    fn of(robot_run: RobotRun, run: usize) -> Self {
         let has_begun =
             robot_run.record.samples > 0 || robot_run.ways.as_ref().is_some_and(|ways| ways.approach.samples > 0);
         let cut_short = |robot_run: RobotRun| {
-            let how = format!("run {}: {}", plan.run, robot_run.status);
-            MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
+            let how = format!("run {run}: {}", robot_run.status);
+            Self::CutShort(Some(robot_run), CutShort::Failed(how))
         };
-        Ok(match &robot_run.status {
+        match &robot_run.status {
             RobotStatus::Waiting { .. } => {
-                MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
+                Self::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
             }
             RobotStatus::Failed { .. } => cut_short(robot_run),
             // If a robot did not move, its log contains no information about the controller.
             RobotStatus::Stopped { .. } if !has_begun => cut_short(robot_run),
             RobotStatus::Interrupted { .. } => {
                 let how = robot_run.status.to_string();
-                MotionOutcome::CutShort(Some(robot_run), CutShort::Interrupted(how))
+                Self::CutShort(Some(robot_run), CutShort::Interrupted(how))
             }
             RobotStatus::Done
             | RobotStatus::Simulated { .. }
             | RobotStatus::Stopped { .. }
             | RobotStatus::Oscillated { .. }
-            | RobotStatus::LeftEnvelope { .. } => MotionOutcome::Run(robot_run),
-        })
+            | RobotStatus::LeftEnvelope { .. } => Self::Run(robot_run),
+        }
     }
 }
