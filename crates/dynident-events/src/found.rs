@@ -62,7 +62,8 @@ pub(crate) fn of_overflow(
     one: &Overflow,
     [from_s, to_s]: [f64; 2],
     names: &[String],
-    (is_clear, duration_s): (bool, f64),
+    is_clear: bool,
+    duration_s: f64,
 ) -> LogEvent {
     let joints = vec![names[one.joint].clone()];
     LogEvent {

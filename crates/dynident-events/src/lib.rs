@@ -90,7 +90,7 @@ pub fn find_events(
     for one in &overflows {
         let share: f64 = one.times_s.iter().map(|[from_s, to_s]| to_s - from_s).sum::<f64>() / duration_s;
         let is_clear = share <= settings.max_share;
-        events.extend(one.times_s.iter().map(|&times_s| of_overflow(one, times_s, &names, (is_clear, duration_s))));
+        events.extend(one.times_s.iter().map(|&times_s| of_overflow(one, times_s, &names, is_clear, duration_s)));
     }
     events.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     events.extend(trends(&rows, &scan).iter().map(|trend| of_trend(&rows, trend, &names)));

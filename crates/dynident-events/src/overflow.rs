@@ -39,12 +39,12 @@ fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
         return None;
     }
     let jump_nm = median(jumps.iter().map(|(_, size)| *size).collect());
-    long_overflow(rows, joint, parts, (&jumps, jump_nm)).or_else(|| short_overflow(rows, joint, (&jumps, jump_nm)))
+    long_overflow(rows, joint, parts, &jumps, jump_nm).or_else(|| short_overflow(rows, joint, &jumps, jump_nm))
 }
 
 /// Overflow at peaks that are shorter than the parts of [`long_overflow`]: the torque jumps over its range and back
 /// several times, by much more than dry friction does at a reversal.
-fn short_overflow(rows: &LogRows, joint: usize, (jumps, jump_nm): (&[(f64, f64)], f64)) -> Option<Overflow> {
+fn short_overflow(rows: &LogRows, joint: usize, jumps: &[(f64, f64)], jump_nm: f64) -> Option<Overflow> {
     let own = rows.settings.overflow;
     let times_s = merged(rows, intervals(jumps, own.max_short_s));
     if times_s.len() < own.min_short_intervals {
@@ -86,7 +86,8 @@ fn long_overflow(
     rows: &LogRows,
     joint: usize,
     mut parts: Vec<Part>,
-    (jumps, jump_nm): (&[(f64, f64)], f64),
+    jumps: &[(f64, f64)],
+    jump_nm: f64,
 ) -> Option<Overflow> {
     let (own, mut usual_nm) = (rows.settings.overflow, 0.0);
     let fit_of = |parts: &[Part], is_used: &dyn Fn(&Part) -> bool| {
@@ -125,7 +126,8 @@ fn long_overflow(
 }
 
 /// Parts of the log between two jumps of a joint's torque, and time and size of each jump. Parts of less than
-/// [`min_bins`](OverflowSettings::min_bins) bins are omitted. After an odd number of jumps, a torque at one end of the range has overflowed.
+/// [`min_bins`](OverflowSettings::min_bins) bins are omitted. After an odd number of jumps, a torque at one end of the
+/// range has overflowed.
 fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
     let own = rows.settings.overflow;
     let all = || rows.samples.iter().flat_map(|piece| piece.tau[joint].iter().copied());

@@ -59,8 +59,8 @@ impl<'a> Blocks<'a> {
         fit.map(|fit| (sums, fit))
     }
 
-    /// Fit to the most consistent [`kept_share`](crate::RobustFitSettings::kept_share) of the blocks (least trimmed squares with concentration steps,
-    /// Rousseeuw and Van Driessen, 2006).
+    /// Fit to the most consistent [`kept_share`](crate::RobustFitSettings::kept_share) of the blocks (least trimmed
+    /// squares with concentration steps, Rousseeuw and Van Driessen, 2006).
     pub(crate) fn trimmed_fit(&self) -> Option<Fit> {
         let blocks = self.ranges.len();
         let all = |_: usize| true;

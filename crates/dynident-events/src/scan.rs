@@ -67,7 +67,7 @@ pub(crate) fn scan(rows: &LogRows) -> Option<Scan> {
         let left = residuals(rows, &refit);
         let variance = usual_variance(rows, &left, &dry_friction(rows, &refit), &kept);
         let judged: Vec<Interval> =
-            found.iter().filter_map(|range| judged(rows, range, &kept, (&sums, &refit), (&left, &variance))).collect();
+            found.iter().filter_map(|range| judged(rows, range, &kept, &sums, &refit, &left, &variance)).collect();
         let confirmed = confirmed_events(rows, &found, &kept, &variance);
         let is_kept = |one: &&Interval| {
             one.is_off || one.is_stop || one.passes_warning(&rows.settings) && confirmed.contains(&one.bins)
@@ -97,7 +97,7 @@ fn confirmed_events(rows: &LogRows, found: &[Range<usize>], kept: &[bool], varia
     let friction: Vec<f64> =
         dry_friction(rows, &fit).iter().map(|friction| rows.settings.intervals.breakaway_ratio * friction).collect();
     let variance = usual_variance(rows, &left, &friction, kept);
-    let judged = found.iter().filter_map(|range| judged(rows, range, kept, (&sums, &fit), (&left, &variance)));
+    let judged = found.iter().filter_map(|range| judged(rows, range, kept, &sums, &fit, &left, &variance));
     judged.filter(|one| one.passes_warning(&rows.settings)).map(|one| one.bins).collect()
 }
 
@@ -113,7 +113,8 @@ impl Interval {
     }
 }
 
-/// Disjoint intervals with the largest sums of relative square residuals above [`bin_ratio`](crate::IntervalSettings::bin_ratio), in order of time.
+/// Disjoint intervals with the largest sums of relative square residuals above
+/// [`bin_ratio`](crate::IntervalSettings::bin_ratio), in order of time.
 fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<Range<usize>> {
     let own = rows.settings.intervals;
     let gain = |bin: usize| {
@@ -146,8 +147,8 @@ fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<R
     merged
 }
 
-/// Ranges of at least [`min_duration_s`](crate::DrivesOffSettings::min_duration_s) in which all joints rest with little torque: the drives are off, or the posture
-/// requires no torque.
+/// Ranges of at least [`min_duration_s`](crate::DrivesOffSettings::min_duration_s) in which all joints rest with little
+/// torque: the drives are off, or the posture requires no torque.
 fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
     let (own, is_quiet) = (rows.settings.drives_off, quiet(rows));
     let mut found: Vec<Range<usize>> = Vec::new();
@@ -195,8 +196,10 @@ fn judged(
     rows: &LogRows,
     range: &Range<usize>,
     kept: &[bool],
-    (sums, fit): (&[Normal], &Fit),
-    (left, variance): (&[Vec<f64>], &[Vec<f64>]),
+    sums: &[Normal],
+    fit: &Fit,
+    left: &[Vec<f64>],
+    variance: &[Vec<f64>],
 ) -> Option<Interval> {
     let (settings, joints) = (&rows.settings, rows.joints());
     let mut one = Interval {
@@ -226,7 +229,7 @@ fn judged(
         one.ratio[joint] = excess / usual;
         let weight = &rows.weight[joint];
         let mean_weight = weight[range.clone()].iter().sum::<f64>() / range.len() as f64;
-        let worst = worst_window(rows, (&left[joint], weight), kept, range.len()) / mean_weight;
+        let worst = worst_window(rows, &left[joint], weight, kept, range.len()) / mean_weight;
         one.prominence[joint] = excess / worst.max(rows.settings.intervals.min_other_ratio * usual);
         one.effect[joint] =
             excess.sqrt() / rms(&rows.tau[joint]).max(rows.settings.drives_off.min_reference_ratio * largest);
@@ -308,7 +311,7 @@ fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[V
 }
 
 /// Largest mean weighted square residual of the kept bins over windows of this length.
-fn worst_window(rows: &LogRows, (left, weight): (&[f64], &[f64]), kept: &[bool], length: usize) -> f64 {
+fn worst_window(rows: &LogRows, left: &[f64], weight: &[f64], kept: &[bool], length: usize) -> f64 {
     let is_used = |bin: usize| kept[bin] && rows.usable[bin];
     let square = |bin: usize| if is_used(bin) { weight[bin] * left[bin].powi(2) } else { 0.0 };
     let length = length.min(rows.len());

@@ -346,11 +346,11 @@ pub struct HeldOutSettings {
     pub max_distance_of_repeat: f64,
     /// Share of such instants from which a held-out log repeats the training motion; 0.9.
     pub min_share_of_repeat: f64,
-    /// Smallest number of joints with which a repeated motion is reported; 3. The motions of fewer joints pass near each
-    /// other without being equal.
+    /// Smallest number of joints with which a repeated motion is reported; 3. The motions of fewer joints pass near
+    /// each other without being equal.
     pub min_joints_of_repeat: usize,
-    /// Ratio of the number of residuals to the number of independent residuals, for the standard deviation of a payload;
-    /// 10. Neighbouring residuals are correlated.
+    /// Ratio of the number of residuals to the number of independent residuals, for the standard deviation of a
+    /// payload; 10. Neighbouring residuals are correlated.
     pub residuals_per_independent: f64,
     /// Smallest estimated mass of a payload, in its standard deviations, for the payload to be reported; 5.
     pub min_payload_deviations: f64,

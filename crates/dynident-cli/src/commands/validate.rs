@@ -39,7 +39,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let result = result_file(&options.result);
     let stored = read(&result).map_err(message_of)?;
     if let Some(folder) = &options.samples {
-        write_samples(folder, options, (&study, &result, &stored), &run)?;
+        write_samples(folder, options, &study, &result, &stored, &run)?;
     }
     let file = validate_result(&stored, &result, &study, &options.study, &run);
     let file = file.map_err(known_in(&options.study))?;
@@ -56,7 +56,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 fn write_samples(
     folder: &Path,
     options: &Options,
-    (study, result, stored): (&Study, &Path, &ResultFile),
+    study: &Study,
+    result: &Path,
+    stored: &ResultFile,
     run: &RunOptions<'_>,
 ) -> Result<(), String> {
     let (description, tables) =

@@ -171,8 +171,8 @@ pub struct KindSettings {
     /// Minimum ratio of a joint's squared residual in the event to its usual squared residual, if the contact is at the
     /// link of this joint. 1.0 by default.
     pub min_touch_ratio: f64,
-    /// Minimum evidence of a joint that belongs to the event, relative to the joint with the strongest evidence. 0.02 by
-    /// default.
+    /// Minimum evidence of a joint that belongs to the event, relative to the joint with the strongest evidence. 0.02
+    /// by default.
     pub min_joint_ratio: f64,
 }
 
