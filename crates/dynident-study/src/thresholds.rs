@@ -117,6 +117,7 @@ impl ReportThresholds {
 
 #[cfg(test)]
 mod tests {
+    use super::IdentificationSettings;
     use crate::Study;
     use std::path::Path;
 
@@ -135,6 +136,10 @@ mod tests {
         expected.lag.max_reversal_std = 3.5;
         expected.events.stop.max_distance = 0.05;
         assert_eq!(own.thresholds, expected);
+        let mut settings = IdentificationSettings::default();
+        own.thresholds.apply(&mut settings);
+        assert_eq!(settings.estimation.thresholds.lag.max_reversal_std, 3.5);
+        assert_eq!(settings.events.stop.max_distance, 0.05);
         let again = Study::parse(&own.to_toml().unwrap(), Path::new("study.toml")).unwrap();
         assert_eq!(again.thresholds, expected);
     }

@@ -4,7 +4,7 @@ use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
 use crate::policy::supervision::{BegunMotion, Supervisor};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
-use crate::runs::before_motion::{Commanded, next_motion, rehearsed, ways_of};
+use crate::runs::before_motion::{Commanded, Planned, next_motion, rehearsed, ways_of};
 use crate::runs::iteration::Iteration;
 use crate::setup::error::IterationError;
 use crate::setup::home::{FoundPaths, HomeError};
@@ -67,8 +67,8 @@ impl Iteration {
             Err(HomeError::Interrupted) => return interrupted(),
             Err(error) => return refused(&error),
         };
-        let with = (plan, &controller, model.as_ref());
-        match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
+        let planned = Planned { plan, controller: &controller, model: model.as_ref(), ways: &ways };
+        match rehearsed(task, settings, &robot, &planned, before, &stopped)? {
             Ok(rehearsal) => {
                 let known = before.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
                 let known = known.map(|known| (robot.into_owned(), known.clone()));
