@@ -83,8 +83,8 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     };
     let has_mistake = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some() || found.is_unexplained());
     // Logs that do not determine the parameters cannot be compared.
-    let settings = settings.estimation.weighted();
-    let loads = if has_mistake { Vec::new() } else { log_loads(&training, &settings).unwrap_or_default() };
+    let (limits, settings) = (&settings.thresholds.log_load, settings.estimation.weighted());
+    let loads = if has_mistake { Vec::new() } else { log_loads(&training, &settings, limits).unwrap_or_default() };
     let rows = training.problem.joint_rows().iter().sum();
     let parameters = robot.base().count();
     Ok(StudyExamination { imports, diagnosis, loads, events, position_torques, rows, parameters })

@@ -3,6 +3,7 @@
 
 use super::channels::Channels;
 use super::explanation::predicted;
+use super::joint_fits::MIN_RESIDUAL_SHARE;
 use super::lag_search::LagSearch;
 use super::mistakes::{Breadth, Mistake, Setup};
 use super::motion_rows::{INSTANTS, MotionRows};
@@ -10,9 +11,6 @@ use super::plausibility::beyond_limits;
 use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
-
-/// Minimum unexplained share of a joint's torque; smaller shares are treated as equal to it.
-const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
 /// A mistake of one held-out log. After its correction, the parameters from the training logs explain the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,22 +134,6 @@ pub(super) fn held_out_hypothesis(
     };
     let mut tried: Vec<Candidate> = all.into_par_iter().map(without).collect();
     tried.sort_by(|a, b| a.score().total_cmp(&b.score()));
-    if std::env::var("DBGH").is_ok() {
-        eprintln!(
-            "as written {} rms {} left {:?} trained {:?}",
-            as_written.score, as_written.rms, as_written.left, as_written.trained
-        );
-        for one in tried.iter().take(4) {
-            eprintln!(
-                "  {:?} score {} rms {} left {:?} clear {}",
-                one.mistake,
-                one.score(),
-                one.residual.rms,
-                one.residual.left,
-                one.is_clear(&as_written, settings)
-            );
-        }
-    }
     let least = tried.first().map_or(f64::INFINITY, Candidate::score);
     let late = lag_search.and_then(|lag_search| late_torque(known, lag_search));
     let late = late.filter(|late| late.score() < least && late.is_clear(&as_written, settings));

@@ -56,7 +56,7 @@ pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Re
     let mut found = HeldOutLogs::default();
     let is_bare = |log: &usize| logs.recordings[*log].payload.is_none();
     for log in logs.of_role(Role::Validate).into_iter().filter(is_bare) {
-        let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
+        let samples = [MotionSamples::of_recording(logs, trained.model, log, &settings.motion)?];
         let rows = samples[0].instants(INSTANTS);
         if repeats_motion(trained.rows, &rows, &settings.held_out) {
             found.repeated_motions.push(log);

@@ -93,39 +93,3 @@ fn with_change(keys: StudyKeys, change: &StudyChange) -> StudyKeys {
         None => keys,
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use dynident_identification::diagnosis::{Channels, Order, Sign};
-
-    /// Joints a, b, c, d are logged as b, a, d, c, and the sign of two torques is reversed.
-    #[test]
-    fn later_corrections_of_a_key_contain_the_earlier_ones() {
-        let format = "rate_hz = 100.0\nposition = { columns = [4, 5, 6, 7] }\n\
-                      torque = { columns = \"t{1..4}\", sign = [1, -1, 1, 1] }";
-        let keys = StudyKeys {
-            format: toml::from_str(format).unwrap(),
-            table: "format".to_owned(),
-            places: vec![0, 1, 2, 3],
-            columns: 4,
-            torque_lag_s: None,
-            has_base_rotation: false,
-        };
-        let order = |order: [usize; 4]| Order { order: order.to_vec(), channels: Channels::Both }.into();
-        let sign = |joint: usize| Sign { joints: vec![joint], channels: Channels::Torque }.into();
-        let mistakes = [order([1, 0, 2, 3]), sign(0), order([0, 1, 3, 2]), sign(3)];
-        let (found, before) = successive_changes(&mistakes, Some(&keys));
-        let lines = |number: usize| -> Vec<&str> {
-            found[number].iter().map(|change| change.line.split("   #").next().unwrap()).collect()
-        };
-        assert_eq!(lines(0), ["columns = [5, 4, 6, 7]", "columns = [\"t2\", \"t1\", \"t3\", \"t4\"]"]);
-        assert_eq!(lines(1), ["sign = [-1, -1, 1, 1]"]);
-        assert_eq!(lines(2), ["columns = [5, 4, 7, 6]", "columns = [\"t2\", \"t1\", \"t4\", \"t3\"]"]);
-        assert_eq!(lines(3), ["sign = [-1, -1, 1, -1]"]);
-        let is_noted = |number: usize| found[number].iter().all(|change| change.line.contains("in place of"));
-        assert_eq!([0, 1, 2, 3].map(is_noted), [false, false, true, true]);
-        let columns = before.unwrap().format.position.column_list("columns").unwrap();
-        assert_eq!(format!("{columns:?}"), "[Index(5), Index(4), Index(7), Index(6)]");
-    }
-}

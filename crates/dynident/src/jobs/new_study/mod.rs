@@ -17,7 +17,7 @@ use crate::error::Error;
 use crate::jobs::check::check;
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
-use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
@@ -107,29 +107,11 @@ pub fn new_study_with(
         draft.apply(change, "As stated");
     }
 
-    let mut examined = None;
     let mut unsure = draft.unsure();
     unsure.extend(recorded.unused_recordings(&logs));
     let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
-    if !unsure.iter().any(without_rate) {
-        for _ in 0..MAX_ROUNDS {
-            let study = request.study(&draft)?;
-            let found = match check(&study, &request.out, options) {
-                Ok(found) => found.check,
-                Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // Except for the part that the error names, the study is known, so it is written.
-                Err(error) => {
-                    unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
-                    break;
-                }
-            };
-            let changed = draft.apply_corrections(&found);
-            examined = Some(found);
-            if !changed {
-                break;
-            }
-        }
-    }
+    let examined =
+        if unsure.iter().any(without_rate) { None } else { corrected(request, options, &mut draft, &mut unsure)? };
     let remaining = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
     unsure.extend(remaining.map(|finding| Unsure {
         line: None,
@@ -149,4 +131,32 @@ pub fn new_study_with(
         unsure,
         check: examined,
     })
+}
+
+/// Checks the drafted study and corrects it, until `check` finds nothing to correct. Returns the last findings.
+fn corrected(
+    request: &NewStudy,
+    options: &RunOptions<'_>,
+    draft: &mut Draft,
+    unsure: &mut Vec<Unsure>,
+) -> Result<Option<StudyCheck>, Error> {
+    let mut examined = None;
+    for _ in 0..MAX_ROUNDS {
+        let study = request.study(draft)?;
+        let found = match check(&study, &request.out, options) {
+            Ok(found) => found.check,
+            Err(error @ Error::Interrupted { .. }) => return Err(error),
+            // Except for the part that the error names, the study is known, so it is written.
+            Err(error) => {
+                unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
+                break;
+            }
+        };
+        let changed = draft.apply_corrections(&found);
+        examined = Some(found);
+        if !changed {
+            break;
+        }
+    }
+    Ok(examined)
 }
