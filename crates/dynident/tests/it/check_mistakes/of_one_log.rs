@@ -2,6 +2,7 @@
 
 use super::{Case, JOINTS, SAME, beside_limits, check_text, each, prepared, problems, study_of, write_noisy};
 use crate::common::{Job, Motion, Truth, header, repository, write_log};
+use dynident::model::{InertialParameters, Mat3, Vec3};
 
 #[test]
 fn mistakes_of_the_held_out_log_are_named_as_its_own() {
@@ -115,7 +116,7 @@ fn a_declared_payload_of_a_training_log_is_no_mistake() {
     write_noisy(&folder.path().join("loaded.csv"), &truth, 3);
     let study = study_of(&description, 6, &["bare.csv", "test.csv"])
         + "[[log]]\nfile = \"loaded.csv\"\npayload = \"box\"\n[[payload]]\nname = \"box\"\n";
-    let link = &truth.model.bodies().last().unwrap().name;
+    let link = truth.model.bodies().last().unwrap().name();
     let known = "mass_kg = 8.0\ncom_m = [0.02, 0.03, 0.1]\ninertia_at_com_kgm2 = [0.02, 0, 0, 0.02, 0, 0.02]\n";
     let found = check_text(folder.path(), &format!("{study}link = {link:?}\n{known}"));
     assert_eq!(beside_limits(&found), []);
