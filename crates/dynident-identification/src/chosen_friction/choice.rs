@@ -1,8 +1,9 @@
 //! Selection of friction from the recordings: first the terms, then their nonlinear constants.
 
-use super::constants::{error_of_constants, friction_evidence, one_step, with_constants};
+use super::constants::{
+    best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, take, with_constants,
+};
 use super::passes::{with_friction_of, with_terms, without_bars};
-use super::starts::{Refined, best_constants, better_of_joints, take};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
@@ -107,13 +108,14 @@ fn friction_by_terms(
         Some(found) => found,
         None => friction_of_grid(passes, robot, &searches, GridTerms::All)?,
     };
+    let GridFriction { model, mut joints, stated, gains } = of_grid;
     let near_rest: Vec<&str> =
         searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
     let of_constants = TrainingPasses { logs: of_constants, ..*passes };
-    let Refined { joints, mut model, error } = best_constants(&of_constants, robot, &of_grid, &near_rest)?;
+    let (mut model, constants_error) = best_constants(&of_constants, robot, &mut joints, &near_rest, model, &gains)?;
     // The next fit estimates the torque gains with the selected friction.
     model.torque_gains.clear();
-    Ok(ChosenFriction { model, joints, stated: Some(of_grid.stated), constants_error: error })
+    Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,13 +156,10 @@ fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel
 
 #[derive(Clone)]
 pub(crate) struct GridFriction {
-    pub(super) model: RegressorModel,
-    pub(super) joints: Vec<JointFriction>,
-    /// Terms of other candidates for each of these joints.
-    pub(super) runners_up: Vec<Vec<Vec<TorqueTerm>>>,
+    model: RegressorModel,
+    joints: Vec<JointFriction>,
     stated: (Training, Estimate),
-    /// Joints with unknown torque gains.
-    pub(super) gains: Vec<usize>,
+    gains: Vec<usize>,
 }
 
 impl GridFriction {
@@ -206,7 +205,7 @@ fn friction_of_grid(
     // friction is not a candidate, because its load would be that of the bare arm.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);
     let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, scale(*joint)))).collect();
-    let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(|one| smooth_step_width(&one.friction)).collect();
+    let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(smooth_step_width).collect();
     let is_loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
     let all = |((joint, search), width): (&(usize, &FrictionSearch), &Option<f64>)| {
         let mut columns = candidate_columns(search, scale(*joint), *width);
@@ -214,10 +213,9 @@ fn friction_of_grid(
         (*joint, columns)
     };
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
-    let chosen = chosen_among(&candidates)?.into_iter().map(|one| (one.friction, one.runners_up));
-    let (joints, runners_up): (Vec<_>, Vec<_>) = chosen.unzip();
+    let joints = chosen_among(&candidates)?;
     let model = with_friction_of(robot, &joints, &first.model, &plain.values)?;
-    Ok(GridFriction { model, joints, runners_up, stated: (first, plain), gains })
+    Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 
 /// Compares two selections of friction on the same rows: `chosen`, which was selected at another cut-off and whose

@@ -1,10 +1,13 @@
-//! Nonlinear constants of selected friction, estimated together with all parameters in passes over the recordings.
+//! Nonlinear constants of selected friction, estimated together with all parameters. Passes over the recordings start
+//! from the values on the grid, and from a second start if the first is known to end in a local minimum.
 
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator};
-use crate::friction::{ConstantsError, ConstantsStep, FrictionConstants, JointFriction, Weak};
-use crate::likelihood::deviance;
+use crate::friction::{
+    ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, Weak, is_one_friction, second_start,
+};
+use crate::likelihood::{JointScore, deviance};
 use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate, plain_values};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{LinearProblem, WeightedValues};
@@ -126,6 +129,85 @@ pub(crate) fn friction_evidence(
     Ok(joints.iter().zip(before).map(of_joint).collect())
 }
 
+/// Finds the best constants from the values on the grid and, for joints with rows near rest, from a [second
+/// start](second_start). For each joint, the friction with the lower Bayesian information criterion is used. `gains`
+/// are joints with unknown torque gains.
+pub(crate) fn best_constants(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    joints: &mut Vec<JointFriction>,
+    near_rest: &[&str],
+    model: RegressorModel,
+    gains: &[usize],
+) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
+    let mut others = joints.clone();
+    let mut is_moved = vec![false; joints.len()];
+    for (one, is_moved) in others.iter_mut().zip(&mut is_moved).filter(|(one, _)| near_rest.contains(&&one.joint[..])) {
+        let place = model.model().joint_index(&one.joint);
+        let scale = place.map(|joint| JointScale::of(robot.model(), joint));
+        if let (Some(terms), Some(scale)) = (&one.terms, scale)
+            && let Some(start) = second_start(terms, scale)
+        {
+            one.choose(&start);
+            *is_moved = true;
+        }
+    }
+    let first = with_constants(passes, robot, joints, model, gains)?;
+    if !is_moved.contains(&true) {
+        return Ok(first);
+    }
+
+    // Fit from the second start; the better result of both is used.
+    let start = passes.with_friction(robot, &others, &first.0)?;
+    let second = with_constants(passes, robot, &mut others, start, gains)?;
+    let as_counted = vec![1.0; joints.len()];
+    let taken = better_of_joints(passes, joints, &first.0, &others, &second.0, &is_moved, &as_counted)?;
+    if !taken.contains(&true) {
+        return Ok(first);
+    }
+    if taken == is_moved {
+        *joints = others;
+        return Ok(second);
+    }
+    take(joints, others, &taken);
+    let start = passes.with_friction(robot, joints, &first.0)?;
+    with_constants(passes, robot, joints, start, gains)
+}
+
+/// For each joint, whether the friction `others` has a lower Bayesian information criterion (Schwarz, Annals of
+/// Statistics 6 (1978) 461) than the friction `joints`. It must be lower with all rows and with the number of rows
+/// divided by `design_effects`. Only joints in `is_other` can differ.
+pub(crate) fn better_of_joints(
+    passes: &TrainingPasses<'_>,
+    joints: &[JointFriction],
+    model: &RegressorModel,
+    others: &[JointFriction],
+    of_others: &RegressorModel,
+    is_other: &[bool],
+    design_effects: &[f64],
+) -> Result<Vec<bool>, IdentificationError> {
+    let of_joints =
+        |model: &RegressorModel, joints: &[JointFriction]| -> Result<Vec<JointScore>, IdentificationError> {
+            let scores = friction_scores(passes, model, joints)?;
+            let place = |one: &JointFriction| model.model().joint_index(&one.joint);
+            Ok(joints.iter().map(|one| place(one).map_or(JointScore::default(), |joint| scores[joint])).collect())
+        };
+    let (first, second) = (of_joints(model, joints)?, of_joints(of_others, others)?);
+    let is_possible = |one: &JointFriction| one.terms.as_deref().is_none_or(is_one_friction);
+    let is_better = |place: usize| {
+        let counted = |effect: f64| second[place].bic(effect) < first[place].bic(effect);
+        is_other[place] && is_possible(&others[place]) && counted(1.0) && counted(design_effects[place])
+    };
+    Ok((0..joints.len()).map(is_better).collect())
+}
+
+/// Copies the friction in `others` to the joints that are marked in `taken`.
+pub(crate) fn take(joints: &mut [JointFriction], others: Vec<JointFriction>, taken: &[bool]) {
+    for ((one, other), _) in joints.iter_mut().zip(others).zip(taken).filter(|(_, taken)| **taken) {
+        *one = other;
+    }
+}
+
 /// Uncertainty of the constants of friction that was selected from other rows, computed from these rows; `None` without
 /// constants.
 pub(crate) fn error_of_constants(
@@ -159,6 +241,24 @@ pub(crate) fn one_step(
     let error = step.error().clone();
     let terms = constants.moved(&step.steps);
     Ok(Some((with_chosen(robot, joints, &terms, model, &measured.fit.values)?, error)))
+}
+
+/// Quality of the fit to each joint's rows. The number of parameters of a joint is the number of terms and constants of
+/// its friction.
+fn friction_scores(
+    passes: &TrainingPasses<'_>,
+    model: &RegressorModel,
+    joints: &[JointFriction],
+) -> Result<Vec<JointScore>, IdentificationError> {
+    let (rows, fit) = passes.rows_and_fit(model)?;
+    let constants = FrictionConstants::new(model, joints);
+    let mut scores = vec![JointScore::default(); model.dof()];
+    for ((&joint, count), &sigma) in rows.joints.iter().zip(rows.problem.joint_rows()).zip(&fit.joint_sigma) {
+        let is_own = |term: &&TorqueTerm| term.is_joint_friction() && term.own_joint() == Some(joint);
+        let terms = model.parametric.terms().iter().filter(is_own).count();
+        scores[joint] = JointScore { rows: count, sigma, own: terms + constants.count(joint) };
+    }
+    Ok(scores)
 }
 
 /// Refines the constants of the selected terms and drops insignificant terms; returns the model and the uncertainty of
@@ -264,10 +364,7 @@ impl TrainingPasses<'_> {
         with_friction_of(robot, joints, before, &fit.values)
     }
 
-    pub(super) fn rows_and_fit(
-        &self,
-        model: &RegressorModel,
-    ) -> Result<(Training, WeightedValues), IdentificationError> {
+    fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, WeightedValues), IdentificationError> {
         let rows = self.rows_once(model.clone())?;
         let fit = plain_values(&self.settings.estimation, &rows.problem)?;
         Ok((rows, fit))

@@ -3,7 +3,6 @@
 mod choice;
 mod constants;
 mod passes;
-mod starts;
 
 pub use choice::{ChosenFriction, choose_friction};
 

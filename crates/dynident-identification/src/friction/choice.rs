@@ -5,7 +5,7 @@
 //! [`CrossValidation`]). The module `search` contains the search for one joint.
 
 use super::candidates::{CandidateColumn, JointScale};
-use super::joint_friction::{GridChoice, JointFriction};
+use super::joint_friction::JointFriction;
 use super::search::{SearchLimits, search};
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
 use dynident_estimation::{CrossValidation, Estimate, EstimationError, LinearProblem};
@@ -88,12 +88,9 @@ pub(crate) fn choose_friction(
     limits: &[SearchLimits<'_>],
     plain: &Estimate,
     equal_weights: bool,
-) -> Result<Vec<GridChoice>, EstimationError> {
+) -> Result<Vec<JointFriction>, EstimationError> {
     let name = |joint: usize| model.model().joints()[joint].name.clone();
-    let refused = |joint: usize, reason: &str| GridChoice {
-        friction: JointFriction::as_stated(name(joint), reason),
-        runners_up: Vec::new(),
-    };
+    let refused = |joint: usize, reason: &str| JointFriction::as_stated(name(joint), reason);
     let choose: Vec<usize> = candidates.iter().map(|(joint, _)| *joint).collect();
     let Some((validation, folds)) = cross_validation(wide_problem)? else {
         let reason = "the training logs are too short for cross-validation in blocks";
@@ -133,10 +130,10 @@ pub(crate) fn choose_friction(
                 Err(error) => Err(error),
             }
         };
-    let mut chosen: Vec<GridChoice> = Vec::new();
+    let mut chosen: Vec<JointFriction> = Vec::new();
     let mut before: Vec<Option<Vec<usize>>> = vec![None; choose.len()];
     for _ in 0..ROUNDS {
-        let found: Vec<(GridChoice, Vec<usize>)> = candidates
+        let found: Vec<(JointFriction, Vec<usize>)> = candidates
             .par_iter()
             .zip(limits)
             .map(|((joint, columns), limits)| of_joint(*joint, columns, limits, &before))
@@ -144,10 +141,10 @@ pub(crate) fn choose_friction(
         (chosen, before) = found
             .into_iter()
             .zip(candidates)
-            .map(|((choice, places), (_, columns))| {
+            .map(|((friction, places), (_, columns))| {
                 let wide = places.iter().filter_map(|&at| place(&columns[at].term)).collect();
-                let known = choice.friction.terms.is_some().then_some(wide);
-                (choice, known)
+                let known = friction.terms.is_some().then_some(wide);
+                (friction, known)
             })
             .unzip();
     }

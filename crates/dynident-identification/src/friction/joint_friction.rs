@@ -26,14 +26,6 @@ pub struct JointFriction {
     pub unrestricted: Option<UnrestrictedFriction>,
 }
 
-/// Friction of a joint that was selected with constants on a grid.
-#[derive(Clone, Debug)]
-pub(crate) struct GridChoice {
-    pub(crate) friction: JointFriction,
-    /// Terms of other candidates that could be better with constants between the grid points.
-    pub(crate) runners_up: Vec<Vec<TorqueTerm>>,
-}
-
 /// Loss of accuracy because the study restricts the friction laws: the selection without the restriction, for
 /// comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -18,7 +18,7 @@
 
 use super::candidates::{CandidateColumn, FrictionKind, JointScale, options, takes_one};
 use super::constants::{mean_term, with_one_step};
-use super::joint_friction::{FrictionCandidate, GridChoice, JointFriction, UnrestrictedFriction};
+use super::joint_friction::{FrictionCandidate, JointFriction, UnrestrictedFriction};
 use crate::thresholds::FrictionThresholds;
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::{CandidateRole, TorqueTerm};
@@ -63,10 +63,6 @@ impl ScoredCandidate {
         (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number), scale)).collect()
     }
 
-    fn present_kinds(&self, columns: &[CandidateColumn]) -> Vec<FrictionKind> {
-        self.kinds.iter().copied().filter(|&kind| !self.present(columns, kind).is_empty()).collect()
-    }
-
     fn parameters(&self, columns: &[CandidateColumn]) -> Vec<String> {
         let mut symbols: Vec<String> = Vec::new();
         for (place, _) in self.kinds.iter().flat_map(|&kind| self.present(columns, kind)) {
@@ -79,12 +75,14 @@ impl ScoredCandidate {
     }
 
     fn complexity(&self, columns: &[CandidateColumn]) -> usize {
-        let constants = self.present_kinds(columns).into_iter().map(|kind| kind.constants);
+        let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
+        let constants = self.kinds.iter().filter(is_present).map(|kind| kind.constants);
         self.parameters(columns).len() + constants.sum::<usize>()
     }
 
     fn present_name(&self, columns: &[CandidateColumn]) -> String {
-        let names: Vec<&str> = self.present_kinds(columns).into_iter().map(|kind| kind.name).collect();
+        let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
+        let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name).collect();
         if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
     }
 
@@ -266,40 +264,19 @@ impl Selection {
         is_permitted: &dyn Fn(FrictionKind) -> bool,
     ) -> Self {
         let all = Self::new(folds, columns, max_inflation, is_permitted);
+        let is_simple =
+            |kind: FrictionKind| of_kind(columns, kind).all(|one| !one.term.has_memory() && !one.term.needs_load());
         let best = all.best();
-        if best.present_kinds(columns).into_iter().all(|kind| is_simple(columns, kind)) {
+        if best.kinds.iter().all(|&kind| is_simple(kind) || best.present(columns, kind).is_empty()) {
             return all;
         }
-        let simple = Self::new(folds, columns, max_inflation, &|kind| is_permitted(kind) && is_simple(columns, kind));
+        let simple = Self::new(folds, columns, max_inflation, &|kind| is_permitted(kind) && is_simple(kind));
         let is_clear = best.errors.rms() < (1.0 - thresholds.min_gain_ratio) * simple.best().errors.rms();
         if is_clear { all } else { simple }
     }
 
     fn best(&self) -> &ScoredCandidate {
         &self.tried[self.chosen]
-    }
-
-    /// Candidates that could be better than the selected one with constants between the grid points, none of them with
-    /// more parameters: the best one with another smoothed sign (Coulomb or sigmoid), and the best one with fewer terms.
-    fn runners_up(&self, columns: &[CandidateColumn]) -> Vec<&ScoredCandidate> {
-        let starts = |kinds: &[FrictionKind]| -> Vec<FrictionKind> {
-            let replaced = kinds.iter().map(|kind| kind.replaces().unwrap_or(kind));
-            replaced.filter(|kind| kind.role == CandidateRole::Start).collect()
-        };
-        let kinds = self.best().present_kinds(columns);
-        let (complexity, start) = (self.best().complexity(columns), starts(&kinds));
-        let may_need_more = !kinds.iter().all(|kind| is_simple(columns, kind));
-        let is_possible = |one: &&ScoredCandidate| {
-            let own = one.present_kinds(columns);
-            one.complexity(columns) <= complexity && (may_need_more || own.iter().all(|kind| is_simple(columns, kind)))
-        };
-        let least = |is_wanted: &dyn Fn(&[FrictionKind]) -> bool| {
-            let wanted = self.tried.iter().filter(is_possible).filter(|one| is_wanted(&one.present_kinds(columns)));
-            wanted.min_by(|a, b| a.errors.rms().total_cmp(&b.errors.rms()))
-        };
-        let of_other_start = least(&|own| starts(own) != start);
-        let with_fewer = least(&|own| own.len() < kinds.len() && starts(own) == start);
-        of_other_start.into_iter().chain(with_fewer).collect()
     }
 
     fn candidates(&self, columns: &[CandidateColumn]) -> Vec<FrictionCandidate> {
@@ -323,11 +300,6 @@ fn of_kind(columns: &[CandidateColumn], kind: FrictionKind) -> impl Iterator<Ite
     columns.iter().filter(move |column| column.kind == kind)
 }
 
-/// Whether every controller and simulator can contain a law: without hysteresis and load dependence.
-fn is_simple(columns: &[CandidateColumn], kind: FrictionKind) -> bool {
-    of_kind(columns, kind).all(|one| !one.term.has_memory() && !one.term.needs_load())
-}
-
 /// Limits of the search for one joint.
 pub(crate) struct SearchLimits<'a> {
     /// Maximum variance inflation of Coulomb friction that differs by direction.
@@ -342,7 +314,7 @@ pub(super) fn search(
     limits: &SearchLimits<'_>,
     folds: &JointFolds,
     columns: &[CandidateColumn],
-) -> (GridChoice, Vec<usize>) {
+) -> (JointFriction, Vec<usize>) {
     let among = |is_permitted: &dyn Fn(FrictionKind) -> bool| {
         Selection::with_clear_gain(folds, columns, limits.max_inflation, limits.thresholds, is_permitted)
     };
@@ -355,17 +327,15 @@ pub(super) fn search(
         cv_error_nm: free.best().errors.rms(),
         restricted_cv_error_nm: best.errors.rms(),
     });
-    let terms = |one: &ScoredCandidate| with_one_step(one.terms(columns, scale));
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
-        terms: Some(terms(best)),
+        terms: Some(with_one_step(best.terms(columns, scale))),
         constants: Vec::new(),
         folds: count,
         candidates: selection.candidates(columns),
         unrestricted,
     };
     let present = best.kinds.iter().flat_map(|&kind| best.present(columns, kind)).map(|(place, _)| place).collect();
-    let runners_up = selection.runners_up(columns).into_iter().map(terms).collect();
-    (GridChoice { friction, runners_up }, present)
+    (friction, present)
 }
