@@ -59,20 +59,6 @@ fn followed_advice_explains_the_torque_as_announced() {
             named: &[],
         },
         Case {
-            name: "two exchanges",
-            rows: |rows| {
-                each(rows, |row| {
-                    [(1, 2), (3, 4)].into_iter().for_each(|(a, b)| {
-                        row.swap(a, b);
-                        row.swap(a + 6, b + 6);
-                    })
-                })
-            },
-            study: SAME,
-            kind: "order",
-            named: &[],
-        },
-        Case {
             name: "zero of the elbow",
             rows: |rows| each(rows, |row| row[3] += 0.5),
             study: SAME,

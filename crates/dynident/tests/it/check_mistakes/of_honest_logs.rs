@@ -168,7 +168,8 @@ fn positions_of_the_motors_side_have_their_gear_ratio() {
             continue;
         };
         let line = &found.write[0].line;
-        let scale = if line.contains("deg") { PI / 180.0 } else { line.rsplit(' ').next().unwrap().parse().unwrap() };
+        let value = line.split_once("   #").map_or(&line[..], |(value, _)| value);
+        let scale = if line.contains("deg") { PI / 180.0 } else { value.rsplit(' ').next().unwrap().parse().unwrap() };
         let [least, greatest] = numbers_between(&found.evidence).unwrap_or([0.9 * scale, 1.1 * scale]);
         // Ranges from slow logs extend to twice and half of the truth.
         if !(least..=greatest).contains(&GEAR_RATIO.recip()) || !(0.5..2.0).contains(&(GEAR_RATIO * scale)) {
