@@ -83,8 +83,8 @@ pub(super) fn servo_file(
     Ok(file)
 }
 
-/// Problems of joints whose simulated motion in held-out logs differs from the measured one by a large part of the motion. Friction and
-/// soft drives cause at most a few percent; a reversed or exchanged joint causes half of the motion or more.
+/// Problems of joints whose simulated motion in held-out logs differs from the measured one by a large part of the
+/// motion. Friction and soft drives cause at most a few percent of it.
 fn wrong_motions(file: &ServoFile) -> Vec<String> {
     let of_log = |log: &ServoLog| {
         let all = file.joints.iter().zip(log.errors.iter().zip(&log.ranges));
