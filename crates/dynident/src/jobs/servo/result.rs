@@ -17,8 +17,8 @@ pub(super) const DETERMINED: f64 = 0.5;
 /// Least time by which a motion must begin before its command to be reported, s: steps of the simulation are 2.5 ms.
 const LEAST_LATE_S: f64 = 0.0025;
 /// Largest root mean square error of a simulated joint in a usable model, rad (m), and relative to the range of its
-/// measured motion; both must be exceeded. Held-out motions of a real SO-101 have at most 13 mrad, simulated arms with a
-/// reversed or exchanged joint 200 mrad and 15 % or more.
+/// measured motion; both must be exceeded. A real SO-101 has at most 13 mrad in held-out motions, simulated arms with a
+/// reversed or exchanged joint have 200 mrad and 15 % or more.
 const LARGEST_ERROR: f64 = 0.03;
 const LARGEST_ERROR_SHARE: f64 = 0.1;
 /// The scale is determined if its interval is at most this part of that before the fit: without an anchor, the fit
