@@ -42,12 +42,21 @@ pub(super) fn changes_of_log(mistake: &Mistake, study: &Study, keys: &StudyKeys,
     let found = changes(mistake, Some(keys));
     let corrected = found.iter().fold(keys.clone(), with_change).format;
     let is_of_format = found.iter().all(|change| change.table.starts_with(&keys.table)) && corrected != keys.format;
-    match toml::Value::try_from(&corrected) {
-        Ok(format) if is_of_format && study.log[index].format.is_none() => {
+    match stated_keys(&corrected) {
+        Some(format) if is_of_format && study.log[index].format.is_none() => {
             vec![StudyChange { table: format!("[[log]] {}", index + 1), line: format!("format = {format}") }]
         }
         _ => found,
     }
+}
+
+/// The format as TOML without the keys that have their default values.
+fn stated_keys(format: &LogFormat) -> Option<toml::Value> {
+    let usual: LogFormat = toml::from_str("position = { columns = \"q\" }").ok()?;
+    let usual = toml::Table::try_from(&usual).ok()?;
+    let mut stated = toml::Table::try_from(format).ok()?;
+    stated.retain(|key, value| usual.get(key) != Some(value));
+    Some(toml::Value::Table(stated))
 }
 
 /// Key changes that correct mistakes one after the other, and the keys before the last mistake. A later line for the

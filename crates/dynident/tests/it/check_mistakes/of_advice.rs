@@ -52,7 +52,7 @@ fn followed_advice_explains_the_torque_as_announced() {
                 each(rows, |row| {
                     row[8] = -row[8];
                     row[10] = -row[10];
-                })
+                });
             },
             study: SAME,
             kind: "sign",

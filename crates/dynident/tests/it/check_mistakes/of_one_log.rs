@@ -12,7 +12,7 @@ fn mistakes_of_the_held_out_log_are_named_as_its_own() {
             rows: |rows| each(rows, |row| row[1..7].iter_mut().for_each(|q| *q = q.to_degrees())),
             study: SAME,
             kind: "unit",
-            named: &["under [[log]] 2 write `format = {", "unit = \"deg\""],
+            named: &["in [[log]] 2 write `format = {", "unit = \"deg\""],
         },
         Case {
             name: "the lift's torque",
