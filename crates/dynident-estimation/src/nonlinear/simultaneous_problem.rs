@@ -6,7 +6,8 @@ use crate::factor::RankSettings;
 use crate::uncertainty::{CovarianceMethod, Estimate};
 use serde::{Deserialize, Serialize};
 
-/// Model of [`simultaneous_least_squares`]: measurements minus predictions from motion and parameters.
+/// Model of [`simultaneous_least_squares`](crate::simultaneous_least_squares): measurements minus predictions from motion
+/// and parameters.
 pub trait SimultaneousModel {
     /// Error of the model.
     type Error: From<EstimationError>;
@@ -47,7 +48,7 @@ pub struct SimultaneousProblem {
     pub parameters: Vec<f64>,
 }
 
-/// Settings of [`simultaneous_least_squares`].
+/// Settings of [`simultaneous_least_squares`](crate::simultaneous_least_squares).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimultaneousSettings {
@@ -92,7 +93,7 @@ impl SimultaneousSettings {
     }
 }
 
-/// Result of [`simultaneous_least_squares`].
+/// Result of [`simultaneous_least_squares`](crate::simultaneous_least_squares).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimultaneousEstimate {
     /// The parameters. The "joints" of this estimate are the channels, with σ of whitened rows.
