@@ -6,8 +6,8 @@ use crate::factor::RankSettings;
 use crate::uncertainty::{CovarianceMethod, Estimate};
 use serde::{Deserialize, Serialize};
 
-/// Model of [`simultaneous_least_squares`](crate::simultaneous_least_squares): measurements minus predictions from motion
-/// and parameters.
+/// Model of [`simultaneous_least_squares`](crate::simultaneous_least_squares): measurements minus predictions from
+/// motion and parameters.
 pub trait SimultaneousModel {
     /// Error of the model.
     type Error: From<EstimationError>;
