@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Regularisation that is added to the squares of the columns, relative to the largest square.
 const RIDGE: f64 = 1.0e-9;
+
 /// A payload at the last body in one log that the model does not contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnmodelledPayload {

@@ -36,8 +36,8 @@ pub(super) fn changes(mistake: &Mistake, keys: Option<&StudyKeys>) -> Vec<StudyC
     changes.into_iter().map(StudyChange::from).collect()
 }
 
-/// Key changes that correct a mistake of log number `index` only. A log that uses the common format gets a complete
-/// format of its own.
+/// Key changes that correct a mistake of log number `index` only. A log that uses the common format gets its own
+/// complete format.
 pub(super) fn changes_of_log(mistake: &Mistake, study: &Study, keys: &StudyKeys, index: usize) -> Vec<StudyChange> {
     let found = changes(mistake, Some(keys));
     let corrected = found.iter().fold(keys.clone(), with_change).format;

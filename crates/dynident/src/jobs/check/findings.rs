@@ -106,7 +106,7 @@ impl FindingContext<'_> {
         let (mut writes, before_last) = successive_changes(&best.mistakes, keys);
         let last = best.mistakes.last().zip(best.factors_alike);
         if last.is_some_and(|(mistake, range)| !mistake.other_factors(range).is_empty()) {
-            writes.iter_mut().rev().take(1).flatten().for_each(|change| change.line += "   # one of the range above");
+            writes.last_mut().into_iter().flatten().for_each(|change| change.line += "   # one of the range above");
         }
         let one = |(mistake, write): (&Mistake, Vec<StudyChange>)| {
             let evidence = evidence(mistake, &search.as_written, best, joints);
