@@ -59,6 +59,10 @@ pub(crate) struct Options {
     /// URScript.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
+    /// Earlier result of this robot (result.json or its folder): the motion measures what it does not determine;
+    /// replaces `design.prior.result` of the study.
+    #[arg(long, value_name = "RESULT")]
+    result: Option<PathBuf>,
     /// Folder of the robot description; replaces that of the study.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -72,6 +76,7 @@ impl Options {
         let given = [
             ("--check", self.check.is_some()),
             ("--check-log", self.check_log.is_some()),
+            ("--result", self.result.is_some()),
             ("--to urscript", self.to.contains(&Format::Urscript)),
             ("--to waypoints", self.to.contains(&Format::Waypoints)),
             ("--rate-hz", self.rate_hz.is_some()),
@@ -132,6 +137,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
+    }
+    if let Some(result) = &options.result {
+        let file = if result.is_dir() { result.join("result.json") } else { result.clone() };
+        let file = std::path::absolute(&file).map_err(|error| format!("--result {}: {error}", result.display()))?;
+        study.design.get_or_insert_default().prior.result = Some(file);
     }
     let given = options.check.is_some() || options.check_log.is_some();
     let names: Vec<&str> =

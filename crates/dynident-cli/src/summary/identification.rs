@@ -343,7 +343,7 @@ fn poorly_known(r: &ResultFile) -> String {
     }
     let dead = dynident::dead_torques(r);
     let advice = if dead.is_empty() {
-        "`dynident design` finds a motion that measures them".to_owned()
+        "`dynident design` with `--result` finds a motion that measures them".to_owned()
     } else {
         let joints: Vec<String> = dead.iter().map(|joint| name(joint)).collect();
         format!("first find out why the torque of {} is zero", joints.join(", "))

@@ -121,7 +121,8 @@ fn next_step(r: &ResultFile, is_usable: bool) -> String {
     let study = r.provenance.as_ref().and_then(|origin| origin.study.as_ref());
     let study = study.map_or("STUDY.toml", |study| study.file.as_str());
     format!(
-        "Next: `dynident design {study} --out design` finds a motion that measures them; record it and identify again."
+        "Next: `dynident design {study} --result result.json --out design` finds a motion that measures them; record \
+         it and identify again."
     )
 }
 

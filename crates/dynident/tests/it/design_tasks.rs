@@ -2,7 +2,7 @@
 use crate::common::{Job, Motion, Truth, assert_reads_back, header, plain, repository, write_log};
 use core::ops::ControlFlow;
 use dynident::excitation::export::{Sampled, trajectory_csv, waypoints_csv};
-use dynident::{DesignOutcome, StudyRobot, check_log, check_trajectory, design_study};
+use dynident::{DesignOutcome, Study, StudyRobot, check_log, check_trajectory, design_study};
 use std::path::Path;
 
 /// A search of some hundred evaluations; these tests do not need the optimum.
@@ -122,16 +122,18 @@ fn a_result_is_a_prior_for_the_next_run() {
     result["provenance"].as_object_mut().unwrap().remove("content_sha256").unwrap();
     let parameters = result["base_parameters"].as_array_mut().unwrap();
     parameters.reverse();
-    let rows = result["base_parameter_covariance"].as_array_mut().unwrap();
-    rows.reverse();
-    for row in rows {
-        row.as_array_mut().unwrap().reverse();
+    for name in ["base_parameter_covariance", "base_parameter_joint_covariance"] {
+        let rows = result[name].as_array_mut().unwrap();
+        rows.reverse();
+        for row in rows {
+            row.as_array_mut().unwrap().reverse();
+        }
     }
     write(&result);
     let [_, again] = stds(&designed(&deaf));
     assert!(again.iter().zip(&known).all(|(a, b)| (a - b).abs() < 1e-6 * b));
     // An invalid covariance, and one with the wrong size.
-    result["base_parameter_covariance"][0][1] = 1e9.into();
+    result["base_parameter_joint_covariance"][0][1] = 1e9.into();
     write(&result);
     let refused = |job: &Job| {
         design_study(&job.study, &job.path, &Job::options(1), |_| ControlFlow::Break(())).unwrap_err().to_string()
@@ -158,6 +160,39 @@ fn a_result_is_a_prior_for_the_next_run() {
     for (forecast, parameter) in checked.file.forecast.iter().zip(&identified.result.base_parameters) {
         let ratio = forecast.std.unwrap() / parameter.std_white;
         assert!((0.8..1.25).contains(&ratio), "{}: {ratio}", parameter.symbol);
+    }
+}
+
+/// A result of one log has few time segments, so its covariance is singular, and its friction was selected from the log.
+/// It is a prior nevertheless.
+#[test]
+fn a_result_with_few_segments_and_other_friction_is_a_prior() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = repository("examples/ur10_simulated.toml");
+    let identified = Job { study: Study::load(&path).unwrap(), path }.identify().result;
+    let covariance = &identified.base_parameter_covariance;
+    let count = covariance.len();
+    let values: Vec<f64> = covariance.iter().flatten().copied().collect();
+    let excited: Vec<usize> = (0..count).filter(|&index| identified.base_parameters[index].excited).collect();
+    let scaled = nalgebra::DMatrix::from_fn(excited.len(), excited.len(), |i, j| {
+        let (i, j) = (excited[i], excited[j]);
+        values[i * count + j] / (values[i * count + i] * values[j * count + j]).sqrt()
+    });
+    assert!(scaled.symmetric_eigenvalues().min() < 1e-9);
+    std::fs::write(folder.path().join("result.json"), serde_json::to_string(&identified).unwrap()).unwrap();
+
+    let robot = repository("robots/ur10.urdf").display().to_string();
+    let text = format!(
+        "robot.file = {robot:?}\n[drive]\ndrive_inertia = true\nviscous = true\ncoulomb = true\n\
+         [design]\n{SMALL}\ntorque_std_nm = 1e6\nprior = {{ result = \"result.json\" }}\n"
+    );
+    let designed = designed(&Job::new(folder.path(), &text));
+    for forecast in &designed.file.forecast {
+        let own = identified.base_parameters.iter().find(|own| own.symbol == forecast.symbol && own.excited);
+        if let Some(own) = own {
+            let found = forecast.std_with_prior.unwrap();
+            assert!((found - own.std).abs() < 1e-3 * own.std, "{}: {found} {}", forecast.symbol, own.std);
+        }
     }
 }
 

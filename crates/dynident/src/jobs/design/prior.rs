@@ -16,6 +16,8 @@ struct EarlierEstimate {
     base_parameters: Vec<BaseParameterResult>,
     #[serde(default)]
     base_parameter_covariance: Vec<Vec<f64>>,
+    #[serde(default)]
+    base_parameter_joint_covariance: Vec<Vec<f64>>,
 }
 
 /// Smallest size to which a relative uncertainty is applied, relative to the largest value of the same kind in the
@@ -139,7 +141,9 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }
 
-/// Inverse covariance of an earlier result in the order of the robot's columns; zero for unexcited columns.
+/// Inverse covariance of an earlier result in the order of the robot's columns; zero for unexcited columns, and for
+/// friction that the earlier result does not contain. Friction of the earlier result that the study's robot does not
+/// have is left out of the covariance.
 fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let stored: EarlierEstimate = read_part(path)?;
@@ -150,11 +154,22 @@ fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>
         return Err(wrong(message.to_owned()));
     }
     let count = place.len();
-    if rows.len() != count || rows.iter().any(|row| row.len() != count) {
-        return Err(wrong(format!("base_parameter_covariance is not {count} rows of {count} numbers: identify again")));
+    let joint = Some(&stored.base_parameter_joint_covariance).filter(|joint| !joint.is_empty()).unwrap_or(rows);
+    for (name, rows) in [("base_parameter_covariance", rows), ("base_parameter_joint_covariance", joint)] {
+        if rows.len() != count || rows.iter().any(|row| row.len() != count) {
+            return Err(wrong(format!("{name} is not {count} rows of {count} numbers: identify again")));
+        }
     }
-    let excited: Vec<usize> = (0..count).filter(|&index| stored.base_parameters[index].excited).collect();
-    let covariance = DMatrix::from_fn(excited.len(), excited.len(), |i, j| rows[excited[i]][excited[j]]);
+    let used: Vec<(usize, usize)> = (0..count)
+        .filter(|&index| stored.base_parameters[index].excited)
+        .filter_map(|index| Some((index, place[index]?)))
+        .collect();
+    // With few time segments, the covariance is singular: its variances are right, its correlations are not.
+    let scale = |index: usize| (rows[index][index] / joint[index][index]).sqrt();
+    let covariance = DMatrix::from_fn(used.len(), used.len(), |i, j| {
+        let (i, j) = (used[i].0, used[j].0);
+        joint[i][j] * scale(i) * scale(j)
+    });
     // The comparison is false for NaN, so NaN is rejected.
     let symmetric = covariance
         .iter()
@@ -162,14 +177,16 @@ fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>
         .all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(f64::MIN_POSITIVE));
     let small = Some(&covariance).filter(|_| symmetric).and_then(inverse).ok_or_else(|| {
         wrong(
-            "base_parameter_covariance is not symmetric and positive definite: identify with more logs or segments, or with estimator.covariance = \"white\""
+            "the covariance of the base parameters is not symmetric and positive definite: identify again, or with \
+             more logs"
                 .to_owned(),
         )
     })?;
-    let mut information = DMatrix::zeros(count, count);
-    for (i, &row) in excited.iter().enumerate() {
-        for (j, &column) in excited.iter().enumerate() {
-            information[(place[row], place[column])] = small[(i, j)];
+    let columns = robot.layout().columns().len();
+    let mut information = DMatrix::zeros(columns, columns);
+    for (i, &(_, row)) in used.iter().enumerate() {
+        for (j, &(_, column)) in used.iter().enumerate() {
+            information[(row, column)] = small[(i, j)];
         }
     }
     Ok(information)
@@ -177,64 +194,45 @@ fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>
 
 const MAX_LISTED: usize = 6;
 
-fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<usize>, String> {
-    let symbols: Vec<String> = robot.layout().columns().iter().map(Column::symbol).collect();
+/// Column of the robot for each stored parameter; `None` for friction that the robot does not have. The earlier study
+/// may have selected other friction, but all other parameters must be the same.
+fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<Option<usize>>, String> {
+    let columns = robot.layout().columns();
+    let symbols: Vec<String> = columns.iter().map(Column::symbol).collect();
     let expressions = robot.base().expressions();
     let listed = |names: &[&str]| {
         let more =
             if names.len() > MAX_LISTED { format!(" and {} more", names.len() - MAX_LISTED) } else { String::new() };
         format!("{}{more}", names[..names.len().min(MAX_LISTED)].join(", "))
     };
-    let unknown: Vec<&str> =
-        stored.iter().filter(|p| !symbols.contains(&p.symbol)).map(|p| p.symbol.as_str()).collect();
-    let missing: Vec<&str> = symbols
-        .iter()
-        .filter(|symbol| stored.iter().filter(|p| p.symbol == **symbol).count() != 1)
-        .map(String::as_str)
-        .collect();
-    let fix = "use a result of the same robot with the same [drive] and [robot]";
-    if !unknown.is_empty() {
-        return Err(format!("its base parameters {} do not belong to the study's robot: {fix}", listed(&unknown)));
-    }
+    let times = |symbol: &String| stored.iter().filter(|p| p.symbol == *symbol).count();
+    let is_friction = |column: &Column| matches!(column, Column::Term(term) if term.is_joint_friction());
+    let is_wrong = |(column, symbol): &(&Column, &String)| {
+        let found = times(symbol);
+        found > 1 || found == 0 && !is_friction(column)
+    };
+    let missing: Vec<&str> = columns.iter().zip(&symbols).filter(is_wrong).map(|(_, symbol)| symbol.as_str()).collect();
+    let fix = "use a result of the same robot with the same [robot] and the same drive inertia \
+               (drive_inertia = true or false under [drive])";
     if !missing.is_empty() {
-        return Err(format!("base parameters {} of the robot are missing or duplicate: {fix}", listed(&missing)));
+        let unknown: Vec<&str> =
+            stored.iter().filter(|p| !symbols.contains(&p.symbol)).map(|p| p.symbol.as_str()).collect();
+        let others = if unknown.is_empty() {
+            String::new()
+        } else {
+            format!(", and its base parameters {} do not belong to the robot", listed(&unknown))
+        };
+        return Err(format!(
+            "base parameters {} of the robot are missing or duplicate{others}: {fix}",
+            listed(&missing)
+        ));
     }
-    stored
-        .iter()
-        .map(|parameter| {
-            let place = symbols.iter().position(|symbol| *symbol == parameter.symbol).unwrap_or(0);
-            if parameter.expression == expressions[place] {
-                Ok(place)
-            } else {
-                Err(format!(
-                    "its base parameter `{}` is `{}`, but `{}` for the study's robot: {fix}",
-                    parameter.symbol, parameter.expression, expressions[place]
-                ))
-            }
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::inverse;
-    use nalgebra::DMatrix;
-
-    /// Variances of different magnitude: C⁻¹C is accurate to 1e-9 in scaled units.
-    #[test]
-    fn inverse_of_very_unequal_variances() {
-        let root = DMatrix::from_row_slice(3, 3, &[1.0, 0.4, 0.1, 0.0, 1.0, -0.3, 0.2, 0.0, 1.0]);
-        let scale = [1e-6, 1.0, 1e6];
-        let correlated = &root * root.transpose();
-        let covariance = DMatrix::from_fn(3, 3, |i, j| scale[i] * correlated[(i, j)] * scale[j]);
-        let product = inverse(&covariance).unwrap() * &covariance;
-        for i in 0..3 {
-            for j in 0..3 {
-                let expected = f64::from(u8::from(i == j));
-                assert!((product[(i, j)] * scale[i] / scale[j] - expected).abs() < 1e-9);
-            }
-        }
-        assert!(inverse(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0])).is_none());
-        assert!(inverse(&DMatrix::zeros(1, 1)).is_none());
-    }
+    let of = |parameter: &BaseParameterResult| match symbols.iter().position(|symbol| *symbol == parameter.symbol) {
+        Some(place) if parameter.expression != expressions[place] => Err(format!(
+            "its base parameter `{}` is `{}`, but `{}` for the study's robot: {fix}",
+            parameter.symbol, parameter.expression, expressions[place]
+        )),
+        place => Ok(place),
+    };
+    stored.iter().map(of).collect()
 }
