@@ -140,7 +140,7 @@ pub fn explanations(
     for (index, covariance) in covariances.iter().enumerate() {
         expect("rows of the covariance", n, covariance.nrows())?;
         expect("columns of the covariance", n, covariance.ncols())?;
-        found.extend(explanations_with(difference, (index, covariance), groups, settings)?);
+        found.extend(explanations_with(difference, index, covariance, groups, settings)?);
     }
     let largest = found.iter().map(|(log, _)| *log).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = found.iter().map(|(log, _)| (log - largest).exp()).sum();
@@ -154,7 +154,8 @@ pub fn explanations(
 /// Explanations for one covariance, with the logarithm of evidence times prior probability.
 fn explanations_with(
     difference: &DVector<f64>,
-    (index, covariance): (usize, &DMatrix<f64>),
+    index: usize,
+    covariance: &DMatrix<f64>,
     groups: &[ChangeGroup],
     settings: &ChangeSettings,
 ) -> Result<Vec<(f64, Explanation)>, EstimationError> {

@@ -9,20 +9,8 @@ use dynident_dynamics::{BatchWorkspace, Column, PanelLayout, Panels, ParametricM
 use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 
-/// Largest measured torque if the drives are off, relative to the torque that carries the weight (both squared).
-const MAX_TORQUE_OFF: f64 = 0.3;
-/// Maximum time between the start (end) of an interval and the first (last) bin with reliable motion, s. If it is
-/// shorter, the event is treated as lasting from the start (to the end) of the log.
-const END_S: f64 = 1.0;
-/// Minimum share of the squared residual in an interval that a kind of event must explain to be selected.
-const MIN_EXPLAINED: f64 = 0.6;
 /// Number of instants that are compared with a force and a moment on one link.
 const INSTANTS: usize = 50;
-/// Minimum ratio of a joint's squared residual in the event to its usual squared residual, if the contact is at the
-/// link of this joint.
-const MIN_TOUCH_RATIO: f64 = 1.0;
-/// Minimum evidence of a joint that belongs to the event, relative to the joint with the strongest evidence.
-const JOINT_SHARE: f64 = 0.02;
 
 pub(crate) struct Signature {
     /// Start and end, s.
@@ -36,14 +24,8 @@ pub(crate) struct Signature {
 }
 
 /// Classifies one interval.
-pub(crate) fn signature(
-    rows: &LogRows,
-    robot: &ParametricModel,
-    scan: &Scan,
-    one: &Interval,
-    warn_ratio: f64,
-) -> Signature {
-    let mut found = classified(rows, robot, scan, one, warn_ratio);
+pub(crate) fn signature(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> Signature {
+    let mut found = classified(rows, robot, scan, one);
     if found.joints.is_empty() {
         found.joints.push(one.strongest);
     }
@@ -51,7 +33,9 @@ pub(crate) fn signature(
     let is_any = |of: &[EventKind]| kinds.iter().flatten().any(|kind| of.contains(kind));
     let model = robot.model();
     let is_below = |joint: usize| {
-        let touched = |other: usize| one.ratio[other] >= MIN_TOUCH_RATIO && model.moves(joint, model.body_of(other));
+        let touched = |other: usize| {
+            one.ratio[other] >= rows.settings.kind.min_touch_ratio && model.moves(joint, model.body_of(other))
+        };
         (0..rows.joints()).any(touched)
     };
     found.affected = if is_any(&[EventKind::DrivesOff, EventKind::LoadChange, EventKind::Unexplained]) {
@@ -64,8 +48,9 @@ pub(crate) fn signature(
     found
 }
 
-fn classified(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval, warn_ratio: f64) -> Signature {
-    let limit = warn_ratio.max(JOINT_SHARE * one.ratio[one.strongest]);
+fn classified(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> Signature {
+    let (own, warn_ratio) = (rows.settings.kind, rows.settings.warn_ratio);
+    let limit = warn_ratio.max(own.min_joint_ratio * one.ratio[one.strongest]);
     let joints: Vec<usize> = (0..rows.joints()).filter(|&joint| one.ratio[joint] >= limit).collect();
     let [from_s, to_s] = times(rows, &one.bins);
     let of = |kind: EventKind| {
@@ -80,20 +65,20 @@ fn classified(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interv
         return of(EventKind::DrivesOff);
     }
     let [first_s, last_s] = reliable(rows);
-    let persists = to_s + END_S >= last_s || from_s - END_S <= first_s;
+    let persists = to_s + own.end_s >= last_s || from_s - own.end_s <= first_s;
     let (load, offset) = if persists { load_and_offset(rows, robot, scan, one) } else { (0.0, 0.0) };
     if one.is_stop {
         let alternative = (joints.len() > 1).then_some(EventKind::Contact);
         let times_s = time_at_stop(rows, one);
         return Signature { times_s, alternative, joints: vec![one.strongest], ..of(EventKind::JointStop) };
     }
-    if persists && offset >= MIN_EXPLAINED && joints.len() == 1 && offset >= load - 0.05 {
+    if persists && offset >= own.min_explained_share && joints.len() == 1 && offset >= load - own.max_load_lead {
         return Signature { alternative: Some(EventKind::Drift), ..of(EventKind::OffsetChange) };
     }
-    if persists && load >= MIN_EXPLAINED {
+    if persists && load >= own.min_explained_share {
         return Signature { alternative: Some(EventKind::Contact), ..of(EventKind::LoadChange) };
     }
-    if contact_share(rows, robot, scan, one) >= MIN_EXPLAINED {
+    if contact_share(rows, robot, scan, one) >= own.min_explained_share {
         return of(EventKind::Contact);
     }
     if at_rest.iter().all(|rest| *rest) {
@@ -123,9 +108,9 @@ fn time_at_stop(rows: &LogRows, one: &Interval) -> [f64; 2] {
 fn extended(rows: &LogRows, [from_s, to_s]: [f64; 2]) -> [f64; 2] {
     let half = 0.5 * rows.bin_s;
     let (first_s, last_s) = ((rows.time_s[0] - half).max(0.0), rows.time_s[rows.len() - 1] + half);
-    let reliable = reliable(rows);
-    let from_s = if from_s - END_S <= reliable[0] { first_s } else { from_s };
-    [from_s, if to_s + END_S >= reliable[1] { last_s } else { to_s }]
+    let (reliable, end_s) = (reliable(rows), rows.settings.kind.end_s);
+    let from_s = if from_s - end_s <= reliable[0] { first_s } else { from_s };
+    [from_s, if to_s + end_s >= reliable[1] { last_s } else { to_s }]
 }
 
 /// Times of the first and the last bin with reliable motion, s; start and end of the log if there are no such bins. If
@@ -145,7 +130,7 @@ fn is_torque_off(rows: &LogRows, scan: &Scan, one: &Interval, joints: &[usize]) 
             predicted += weight * (rows.tau[joint][bin] - scan.residuals[joint][bin]).powi(2);
         }
     }
-    measured <= MAX_TORQUE_OFF * predicted
+    measured <= rows.settings.drives_off.max_measured_ratio * predicted
 }
 
 /// Two shares of the squared residual in the interval: the share that other masses at the last link explain, and the

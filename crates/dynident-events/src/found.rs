@@ -5,19 +5,12 @@ use crate::kind::{EventKind, LogEvent};
 use crate::overflow::Overflow;
 use crate::rows::LogRows;
 use crate::scan::{Interval, Scan};
-use crate::settings::EventSettings;
 use crate::trend::Trend;
 use dynident_dynamics::ParametricModel;
 
 /// Event from an interval of the search for unexplained torque.
-pub(crate) fn of_interval(
-    rows: &LogRows,
-    robot: &ParametricModel,
-    scan: &Scan,
-    one: &Interval,
-    settings: &EventSettings,
-) -> LogEvent {
-    let found = signature(rows, robot, scan, one, settings.warn_ratio);
+pub(crate) fn of_interval(rows: &LogRows, robot: &ParametricModel, scan: &Scan, one: &Interval) -> LogEvent {
+    let found = signature(rows, robot, scan, one);
     let [from_s, to_s] = found.times_s;
     let joint = one.strongest;
     let kept = || (0..rows.len()).filter(|&bin| scan.kept[bin] && rows.usable[bin]);
@@ -69,7 +62,8 @@ pub(crate) fn of_overflow(
     one: &Overflow,
     [from_s, to_s]: [f64; 2],
     names: &[String],
-    (is_clear, duration_s): (bool, f64),
+    is_clear: bool,
+    duration_s: f64,
 ) -> LogEvent {
     let joints = vec![names[one.joint].clone()];
     LogEvent {
@@ -89,7 +83,7 @@ pub(crate) fn of_overflow(
 
 /// Event for a slow change of the torque, or for a sudden change of the offset. The event of a sudden change is the
 /// shorter part of the log, before or after the change.
-pub(crate) fn of_trend(rows: &LogRows, trend: &Trend, names: &[String], settings: &EventSettings) -> LogEvent {
+pub(crate) fn of_trend(rows: &LogRows, trend: &Trend, names: &[String]) -> LogEvent {
     let half = 0.5 * rows.bin_s;
     let (first_s, last_s) = ((rows.time_s[0] - half).max(0.0), rows.time_s[rows.len() - 1] + half);
     let duration_s = rows.len() as f64 * rows.bin_s;
@@ -106,7 +100,7 @@ pub(crate) fn of_trend(rows: &LogRows, trend: &Trend, names: &[String], settings
         joints,
         kind: trend.kind,
         alternative: None,
-        clear: trend.step.is_some() && (to_s - from_s) <= settings.max_share * duration_s,
+        clear: trend.step.is_some() && (to_s - from_s) <= rows.settings.max_share * duration_s,
         set_aside: false,
         unexplained_nm: trend.size_nm,
         usual_nm: trend.left_nm,

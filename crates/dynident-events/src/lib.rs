@@ -31,7 +31,11 @@ mod settings;
 mod trend;
 
 pub use kind::{EventKind, LogEvent};
-pub use settings::{EventChoice, EventSettings, EventSettingsError};
+pub use settings::{
+    BinSettings, DrivesOffSettings, EventChoice, EventSettings, EventSettingsError, FilledHoleSettings,
+    IntervalSettings, KindSettings, OverflowSettings, RobustFitSettings, StopSettings, TrendSettings,
+    UsualResidualSettings,
+};
 
 use dynident_dynamics::ParametricModel;
 use dynident_rows::{LogError, LogPass};
@@ -41,13 +45,6 @@ use overflow::overflows;
 use rows::LogRows;
 use scan::scan;
 use trend::trends;
-
-/// Time before and after a filled hole in which the filter of the positions spreads its effect, s.
-const LINE_MARGIN_S: f64 = 0.12;
-/// Number of bins before and after an overflow that can contain samples of it.
-const OVERFLOW_BINS: f64 = 1.5;
-/// Minimum number of bins for each parameter of a joint's model.
-const MIN_BINS_PER_PARAMETER: usize = 3;
 
 /// Events of one log, and the residuals in which they were found.
 #[derive(Clone, Debug, Default)]
@@ -74,30 +71,29 @@ pub fn find_events(
     robot: &ParametricModel,
     settings: &EventSettings,
 ) -> Result<EventSearch, LogError> {
-    let Some(mut rows) = LogRows::read(pass, robot)? else { return Ok(EventSearch::default()) };
+    let Some(mut rows) = LogRows::read(pass, robot, settings)? else { return Ok(EventSearch::default()) };
     let duration_s = rows.len() as f64 * rows.bin_s;
     let parameters = rows.width.iter().copied().max().unwrap_or(0);
-    if duration_s < settings.min_duration_s || rows.len() < MIN_BINS_PER_PARAMETER * parameters {
+    if duration_s < settings.min_duration_s || rows.len() < settings.bins.min_bins_per_parameter * parameters {
         return Ok(EventSearch::default());
     }
-    let lines = straight_lines(&rows.samples);
-    rows.leave_out(&lines, LINE_MARGIN_S);
+    let lines = straight_lines(&rows.samples, &settings.filled_hole);
+    rows.leave_out(&lines, settings.filled_hole.margin_s);
     let overflows = overflows(&rows);
     for one in &overflows {
-        rows.leave_out(&one.times_s, OVERFLOW_BINS * rows.bin_s);
+        rows.leave_out(&one.times_s, settings.overflow.margin_bins * rows.bin_s);
     }
-    let Some(scan) = scan(&rows, settings) else { return Ok(EventSearch::default()) };
-    let mut events: Vec<LogEvent> =
-        scan.intervals.iter().map(|one| of_interval(&rows, robot, &scan, one, settings)).collect();
+    let Some(scan) = scan(&rows) else { return Ok(EventSearch::default()) };
+    let mut events: Vec<LogEvent> = scan.intervals.iter().map(|one| of_interval(&rows, robot, &scan, one)).collect();
     let names = robot.joint_names();
     events.extend(lines.iter().map(|&times_s| of_filled_hole(&rows, &scan, &names, times_s)));
     for one in &overflows {
         let share: f64 = one.times_s.iter().map(|[from_s, to_s]| to_s - from_s).sum::<f64>() / duration_s;
         let is_clear = share <= settings.max_share;
-        events.extend(one.times_s.iter().map(|&times_s| of_overflow(one, times_s, &names, (is_clear, duration_s))));
+        events.extend(one.times_s.iter().map(|&times_s| of_overflow(one, times_s, &names, is_clear, duration_s)));
     }
     events.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-    events.extend(trends(&rows, &scan, settings).iter().map(|trend| of_trend(&rows, trend, &names, settings)));
+    events.extend(trends(&rows, &scan).iter().map(|trend| of_trend(&rows, trend, &names)));
     let LogRows { bin_s, time_s, tau, .. } = rows;
     Ok(EventSearch { events, bin_s, time_s, measured: tau, residuals: scan.residuals })
 }

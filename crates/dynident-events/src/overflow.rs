@@ -3,29 +3,10 @@
 use crate::normal::Normal;
 use crate::robust::dry_friction_of_joint;
 use crate::rows::{LogRows, TorquePiece, median};
+use crate::settings::OverflowSettings;
 
-/// Maximum distance of both ends of a jump from the ends of the torque's range, relative to the range.
-const END_SHARE: f64 = 0.15;
-/// Maximum duration of a jump, s, but at least one sample. The removal of outliers can spread a jump.
-const MAX_JUMP_S: f64 = 0.02;
-/// Minimum ratio of two mean square residuals: fit to all parts of the log, and fit to the parts without overflow. Dry
-/// friction also jumps at a reversal, but one model explains both directions, so the ratio stays small.
-const MIN_RESIDUAL_RATIO: f64 = 10.0;
-/// Minimum duration of an overflow, and of a normal part between two overflows, bins.
-const MIN_BINS: usize = 2;
-/// Jumps that follow each other within this time are treated as noise at the limit of the range, bins.
-const MAX_NOISE_BINS: f64 = 4.0;
-/// Smallest and largest mean residual of an overflow, relative to the size of the jump.
-const JUMP_RATIO: [f64; 2] = [0.6, 1.4];
-/// Longest overflow at a peak, s, and minimum number of such peaks.
-const MAX_SHORT_S: f64 = 0.3;
-const MIN_SHORT_INTERVALS: usize = 2;
-/// Minimum size of its jumps relative to the dry friction, which jumps by twice its value at a reversal.
-const MIN_FRICTION_RATIO: f64 = 4.0;
 /// Rounds of fit and assignment of the parts.
 const ROUNDS: usize = 5;
-/// Maximum share of a joint's bins with overflow.
-const MAX_SHARE: f64 = 0.5;
 
 /// Overflow of the torque number of one joint.
 pub(crate) struct Overflow {
@@ -58,18 +39,19 @@ fn overflow(rows: &LogRows, joint: usize) -> Option<Overflow> {
         return None;
     }
     let jump_nm = median(jumps.iter().map(|(_, size)| *size).collect());
-    long_overflow(rows, joint, parts, (&jumps, jump_nm)).or_else(|| short_overflow(rows, joint, (&jumps, jump_nm)))
+    long_overflow(rows, joint, parts, &jumps, jump_nm).or_else(|| short_overflow(rows, joint, &jumps, jump_nm))
 }
 
 /// Overflow at peaks that are shorter than the parts of [`long_overflow`]: the torque jumps over its range and back
 /// several times, by much more than dry friction does at a reversal.
-fn short_overflow(rows: &LogRows, joint: usize, (jumps, jump_nm): (&[(f64, f64)], f64)) -> Option<Overflow> {
-    let times_s = merged(rows, intervals(jumps, MAX_SHORT_S));
-    if times_s.len() < MIN_SHORT_INTERVALS {
+fn short_overflow(rows: &LogRows, joint: usize, jumps: &[(f64, f64)], jump_nm: f64) -> Option<Overflow> {
+    let own = rows.settings.overflow;
+    let times_s = merged(rows, intervals(jumps, own.max_short_s));
+    if times_s.len() < own.min_short_intervals {
         return None;
     }
     let is_near = |time_s: f64| {
-        let is_within = |[from, to]: &[f64; 2]| time_s > from - MAX_SHORT_S && time_s < to + MAX_SHORT_S;
+        let is_within = |[from, to]: &[f64; 2]| time_s > from - own.max_short_s && time_s < to + own.max_short_s;
         times_s.iter().any(is_within)
     };
     let fit = Normal::of_range(rows, joint, 0..rows.len(), |bin| !is_near(rows.time_s[bin]), |_, _| ());
@@ -77,7 +59,7 @@ fn short_overflow(rows: &LogRows, joint: usize, (jumps, jump_nm): (&[(f64, f64)]
     let usual_nm = (fit.squares(&theta) / fit.weight).sqrt();
     let friction_nm = dry_friction_of_joint(rows, joint, &theta);
     let is_overflow =
-        jump_nm > MIN_FRICTION_RATIO * friction_nm && jump_nm.powi(2) > MIN_RESIDUAL_RATIO * usual_nm.powi(2);
+        jump_nm > own.min_friction_ratio * friction_nm && jump_nm.powi(2) > own.min_residual_ratio * usual_nm.powi(2);
     is_overflow.then_some(Overflow { joint, times_s, jump_nm, usual_nm })
 }
 
@@ -99,14 +81,15 @@ fn merged(rows: &LogRows, mut times_s: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     merged
 }
 
-/// Overflow of parts of the log of at least [`MIN_BINS`] bins.
+/// Overflow of parts of the log of at least [`min_bins`](OverflowSettings::min_bins) bins.
 fn long_overflow(
     rows: &LogRows,
     joint: usize,
     mut parts: Vec<Part>,
-    (jumps, jump_nm): (&[(f64, f64)], f64),
+    jumps: &[(f64, f64)],
+    jump_nm: f64,
 ) -> Option<Overflow> {
-    let mut usual_nm = 0.0;
+    let (own, mut usual_nm) = (rows.settings.overflow, 0.0);
     let fit_of = |parts: &[Part], is_used: &dyn Fn(&Part) -> bool| {
         let mut used = vec![false; rows.len()];
         parts.iter().filter(|part| is_used(part)).flat_map(|part| &part.bins).for_each(|&bin| used[bin] = true);
@@ -122,7 +105,7 @@ fn long_overflow(
         let mut is_same = true;
         for part in &mut parts {
             let mean = part.bins.iter().map(residual).sum::<f64>() / part.bins.len() as f64;
-            let is_wrapped = (JUMP_RATIO[0]..JUMP_RATIO[1]).contains(&(mean.abs() / jump_nm));
+            let is_wrapped = (own.min_jump_ratio..own.max_jump_ratio).contains(&(mean.abs() / jump_nm));
             is_same &= is_wrapped == part.is_wrapped;
             part.is_wrapped = is_wrapped;
         }
@@ -132,26 +115,28 @@ fn long_overflow(
     }
     let wrapped: usize = parts.iter().filter(|part| part.is_wrapped).map(|part| part.bins.len()).sum();
     let all_nm = fit_of(&parts, &|_| true)?.0;
-    let is_explained = all_nm.powi(2) < MIN_RESIDUAL_RATIO * usual_nm.powi(2);
-    if wrapped == 0 || wrapped as f64 > MAX_SHARE * rows.len() as f64 || is_explained {
+    let is_explained = all_nm.powi(2) < own.min_residual_ratio * usual_nm.powi(2);
+    if wrapped == 0 || wrapped as f64 > own.max_share * rows.len() as f64 || is_explained {
         return None;
     }
     let mut times_s: Vec<[f64; 2]> = parts.iter().filter(|part| part.is_wrapped).map(|part| part.times_s).collect();
     // Noise at the limit of the range jumps several times.
-    times_s.extend(intervals(jumps, MAX_NOISE_BINS * rows.bin_s));
+    times_s.extend(intervals(jumps, own.max_noise_bins * rows.bin_s));
     Some(Overflow { joint, times_s: merged(rows, times_s), jump_nm, usual_nm })
 }
 
 /// Parts of the log between two jumps of a joint's torque, and time and size of each jump. Parts of less than
-/// [`MIN_BINS`] bins are omitted. After an odd number of jumps, a torque at one end of the range has overflowed.
+/// [`min_bins`](OverflowSettings::min_bins) bins are omitted. After an odd number of jumps, a torque at one end of the
+/// range has overflowed.
 fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
+    let own = rows.settings.overflow;
     let all = || rows.samples.iter().flat_map(|piece| piece.tau[joint].iter().copied());
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), tau| (low.min(tau), high.max(tau)));
     let (mut parts, mut sizes) = (Vec::new(), Vec::new());
     for piece in &rows.samples {
         let samples = piece.tau[joint].len();
         let time_s = |at: usize| piece.first_s + at as f64 / piece.rate_hz;
-        let found = jumps(piece, joint, [low, high]);
+        let found = jumps(piece, joint, [low, high], &own);
         sizes.extend(found.iter().map(|(at, size)| (time_s(*at), size.abs())));
         let ends = found.iter().map(|(at, _)| *at).chain([samples]);
         let (mut from, mut count) = (0, 0_i32);
@@ -164,7 +149,7 @@ fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
             let bins: Vec<usize> = (0..rows.len()).filter(is_inside).collect();
             let moving = bins.iter().filter(|&&bin| rows.is_moving(bin)).count();
             // Parts at rest are omitted here; the test for drives that are off examines them.
-            if bins.len() >= MIN_BINS && 2 * moving >= bins.len() {
+            if bins.len() >= own.min_bins && 2 * moving >= bins.len() {
                 parts.push(Part { times_s, bins, is_wrapped: count != 0 });
             }
             count += found.get(number).map_or(0, |(_, size)| if *size < 0.0 { 1 } else { -1 });
@@ -184,9 +169,9 @@ fn parts(rows: &LogRows, joint: usize) -> (Vec<Part>, Vec<(f64, f64)>) {
 }
 
 /// First sample after each jump from one end of the range (`low`, `high`) to the other, and the change of the torque.
-fn jumps(piece: &TorquePiece, joint: usize, [low, high]: [f64; 2]) -> Vec<(usize, f64)> {
-    let near = END_SHARE * (high - low);
-    let longest = ((MAX_JUMP_S * piece.rate_hz) as usize).max(1);
+fn jumps(piece: &TorquePiece, joint: usize, [low, high]: [f64; 2], own: &OverflowSettings) -> Vec<(usize, f64)> {
+    let near = own.max_end_distance * (high - low);
+    let longest = ((own.max_jump_s * piece.rate_hz) as usize).max(1);
     let (mut last, mut found) = ([None::<usize>; 2], Vec::new());
     let tau = &piece.tau[joint];
     for (at, value) in tau.iter().enumerate() {
@@ -217,11 +202,12 @@ mod tests {
         let sine: Vec<f64> = (0..1000).map(|k| 12.0 * (0.01 * f64::from(k)).sin()).collect();
         let tau: Vec<f64> = sine.iter().map(|&tau| if tau > 10.0 { tau - 20.0 } else { tau }).collect();
         let piece = TorquePiece { first_s: 3.0, rate_hz: 100.0, tau: vec![tau, sine] };
+        let own = OverflowSettings::default();
         // The sine is above 10/12 from 0.985 to 2.156 rad and one period later.
-        let found = jumps(&piece, 0, [-12.0, 10.0]);
+        let found = jumps(&piece, 0, [-12.0, 10.0], &own);
         let at: Vec<usize> = found.iter().map(|(at, _)| *at).collect();
         assert_eq!(at, [99, 216, 727, 844], "{found:?}");
         assert!(found.iter().all(|(_, size)| (size.abs() - 20.0).abs() < 0.2), "{found:?}");
-        assert!(jumps(&piece, 1, [-12.0, 12.0]).is_empty());
+        assert!(jumps(&piece, 1, [-12.0, 12.0], &own).is_empty());
     }
 }

@@ -5,16 +5,10 @@ use crate::rows::{DRIVE_COLUMNS, LogRows, median};
 use core::ops::Range;
 use nalgebra::DVector;
 
-/// Length of a block, s; blocks are longer if there would be more than [`MAX_BLOCKS`].
-const BLOCK_S: f64 = 0.4;
-/// Maximum number of blocks.
+/// Maximum number of blocks; it limits the time of the first fit.
 const MAX_BLOCKS: usize = 100;
-/// Share of the blocks that the robust fit uses.
-const KEPT_SHARE: f64 = 0.6;
 /// Number of iterations (concentration steps) from each start.
 const STEPS: usize = 4;
-/// Limit on a block's relative squared error, so that one joint alone does not decide whether the block is used.
-const MAX_BLOCK_ERROR: f64 = 50.0;
 
 /// Model parameters of all joints.
 pub(crate) type Fit = Vec<DVector<f64>>;
@@ -31,7 +25,9 @@ pub(crate) struct Blocks<'a> {
 
 impl<'a> Blocks<'a> {
     pub(crate) fn new(rows: &'a LogRows) -> Self {
-        let per_block = ((BLOCK_S / rows.bin_s).round() as usize).max(rows.len().div_ceil(MAX_BLOCKS)).max(1);
+        let per_block = ((rows.settings.robust_fit.block_s / rows.bin_s).round() as usize)
+            .max(rows.len().div_ceil(MAX_BLOCKS))
+            .max(1);
         let ranges: Vec<Range<usize>> =
             (0..rows.len()).step_by(per_block).map(|from| from..(from + per_block).min(rows.len())).collect();
         let of_joint = |joint: usize| -> Vec<Normal> {
@@ -63,8 +59,8 @@ impl<'a> Blocks<'a> {
         fit.map(|fit| (sums, fit))
     }
 
-    /// Fit to the most consistent [`KEPT_SHARE`] of the blocks (least trimmed squares with concentration steps,
-    /// Rousseeuw and Van Driessen, 2006).
+    /// Fit to the most consistent [`kept_share`](crate::RobustFitSettings::kept_share) of the blocks (least trimmed
+    /// squares with concentration steps, Rousseeuw and Van Driessen, 2006).
     pub(crate) fn trimmed_fit(&self) -> Option<Fit> {
         let blocks = self.ranges.len();
         let all = |_: usize| true;
@@ -98,7 +94,7 @@ impl<'a> Blocks<'a> {
     /// One concentration step: objective and fit of the selected blocks, and the blocks with the smallest errors of
     /// this fit.
     fn concentrated(&self, kept: &[bool]) -> Option<(f64, Fit, Vec<bool>)> {
-        let blocks = self.ranges.len();
+        let (own, blocks) = (self.rows.settings.robust_fit, self.ranges.len());
         let mut scores = vec![0.0; blocks];
         let (mut fit, mut logs) = (Fit::new(), Vec::new());
         for normals in &self.normals {
@@ -110,7 +106,7 @@ impl<'a> Blocks<'a> {
             let used = |block: &usize| kept[*block] && normals[*block].weight > 0.0;
             let level = median((0..blocks).filter(used).map(|block| errors[block]).collect()).max(f64::MIN_POSITIVE);
             for (score, error) in scores.iter_mut().zip(&errors) {
-                *score += (error / level).min(MAX_BLOCK_ERROR);
+                *score += (error / level).min(own.max_block_error);
             }
             logs.push((errors, level));
             fit.push(theta);
@@ -126,7 +122,7 @@ impl<'a> Blocks<'a> {
         let blocks = if 4 * moving >= blocks { moving } else { blocks };
         let mut order: Vec<usize> = (0..scores.len()).collect();
         order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]).then(a.cmp(b)));
-        let count = ((KEPT_SHARE * blocks as f64).ceil() as usize).clamp(1, blocks);
+        let count = ((own.kept_share * blocks as f64).ceil() as usize).clamp(1, blocks);
         let mut next = vec![false; scores.len()];
         order[..count].iter().for_each(|&block| next[block] = true);
         let mean = |errors: &[f64]| order[..count].iter().map(|&block| errors[block]).sum::<f64>() / count as f64;

@@ -1,22 +1,15 @@
 //! Motion, torque and regressor of one log, averaged over short bins.
 
+use crate::settings::EventSettings;
 use dynident_dynamics::{BatchWorkspace, Column, PanelLayout, Panels, ParametricModel, regressor_panels};
 use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 use dynident_rows::{LogError, LogPass, PANEL_SAMPLES};
 
-/// Length of a bin, s. The start and end of an event are accurate to about two bins.
-const BIN_S: f64 = 0.04;
 /// Number of samples at which the regressor is evaluated in a bin.
 const SAMPLES_PER_BIN: usize = 4;
 /// Maximum number of bins; longer logs have longer bins.
 const MAX_BINS: f64 = 20_000.0;
-/// Velocity scale of the narrow friction function, relative to the root mean square velocity of the joint.
-const STEP_SHARE: f64 = 0.03;
-/// Velocity below which a joint is at rest, relative to its root mean square velocity.
-const REST_SHARE: f64 = 0.1;
-/// Ratio of the velocity scales of the wide and the narrow friction function.
-const WIDE_STEP: f64 = 6.0;
 /// Number of columns that are added for each joint: offset, two smoothed signs of the velocity (narrow and wide), two
 /// powers of velocity, drive inertia, friction that grows with the torque.
 pub(crate) const DRIVE_COLUMNS: usize = 7;
@@ -24,6 +17,8 @@ pub(crate) const DRIVE_COLUMNS: usize = 7;
 /// One log, averaged over bins. Vectors of joints are in the order of the model.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LogRows {
+    /// Settings of the search.
+    pub(crate) settings: EventSettings,
     /// Length of a bin, s.
     pub(crate) bin_s: f64,
     /// Centre of each bin, s after the first data row.
@@ -85,11 +80,15 @@ struct Collected {
 
 impl LogRows {
     /// Reads a log and averages it over bins. `None` for a log without rows.
-    pub(crate) fn read(pass: &LogPass<'_>, robot: &ParametricModel) -> Result<Option<Self>, LogError> {
+    pub(crate) fn read(
+        pass: &LogPass<'_>,
+        robot: &ParametricModel,
+        settings: &EventSettings,
+    ) -> Result<Option<Self>, LogError> {
         let model = robot.model();
         let places = pass.recording.joint_indices(model)?;
         let joints = places.len();
-        let mut rows = Self { q: vec![Vec::new(); joints], ..Self::default() };
+        let mut rows = Self { settings: *settings, q: vec![Vec::new(); joints], ..Self::default() };
         (rows.dq, rows.tau) = (rows.q.clone(), rows.q.clone());
         let mut of = Collected { q: rows.q.clone(), dq: rows.q.clone(), ddq: rows.q.clone(), bin: Vec::new() };
         let mut per_bin = 0;
@@ -98,7 +97,7 @@ impl LogRows {
         let mut take = |block: &MotionBlock| {
             if per_bin == 0 {
                 let duration_s = pass.recording.estimated_rows().unwrap_or(0) as f64 / block.rate_hz;
-                let wanted = BIN_S.max(duration_s / MAX_BINS) * block.rate_hz;
+                let wanted = settings.bins.bin_s.max(duration_s / MAX_BINS) * block.rate_hz;
                 per_bin = (wanted.round() as usize).max(1);
                 rows.bin_s = per_bin as f64 / block.rate_hz;
             }
@@ -191,12 +190,12 @@ impl LogRows {
 
     fn fill_columns(&mut self, robot: &ParametricModel, of: &Collected) {
         let (joints, bins) = (self.q.len(), self.time_s.len());
-        let layout = without_history(robot);
+        let (layout, own) = (without_history(robot), self.settings.bins);
         let body_columns = |joint: usize| layout.as_ref().map_or(0, |layout| layout.joint_columns(joint).len());
         self.width = (0..joints).map(|joint| body_columns(joint) + DRIVE_COLUMNS).collect();
         self.columns = self.width.iter().map(|width| vec![0.0; width * bins]).collect();
-        self.step = (0..joints).map(|joint| (STEP_SHARE * rms(&of.dq[joint])).max(1e-9)).collect();
-        self.rest = (0..joints).map(|joint| REST_SHARE * rms(&of.dq[joint])).collect();
+        self.step = (0..joints).map(|joint| (own.narrow_step_ratio * rms(&of.dq[joint])).max(1e-9)).collect();
+        self.rest = (0..joints).map(|joint| own.rest_ratio * rms(&of.dq[joint])).collect();
         let mut counts = vec![0.0; bins];
         for &bin in &of.bin {
             counts[bin] += 1.0;
@@ -229,7 +228,8 @@ impl LogRows {
                         *value += share * panels.joint(joint)[column * samples + sample];
                     }
                     let (dq, ddq) = (of.dq[joint][from + sample], of.ddq[joint][from + sample]);
-                    let drives = drive_columns([dq, ddq], self.tau[joint][bin], self.step[joint]);
+                    let steps = [self.step[joint], own.wide_step_ratio * self.step[joint]];
+                    let drives = drive_columns([dq, ddq], self.tau[joint][bin], steps);
                     for (value, drive) in row[body..].iter_mut().zip(drives) {
                         *value += share * drive;
                     }
@@ -314,9 +314,9 @@ impl LogRows {
 
 /// Values of the columns for offset, narrow and wide smoothed sign of the velocity, velocity, signed square of the
 /// velocity, acceleration, and friction that grows with the torque.
-fn drive_columns([dq, ddq]: [f64; 2], tau: f64, step: f64) -> [f64; DRIVE_COLUMNS] {
-    let wide = (dq / (WIDE_STEP * step)).tanh();
-    [1.0, (dq / step).tanh(), wide, dq, dq * dq.abs(), ddq, tau.abs() * wide]
+fn drive_columns([dq, ddq]: [f64; 2], tau: f64, [narrow, wide]: [f64; 2]) -> [f64; DRIVE_COLUMNS] {
+    let wide = (dq / wide).tanh();
+    [1.0, (dq / narrow).tanh(), wide, dq, dq * dq.abs(), ddq, tau.abs() * wide]
 }
 
 pub(crate) fn rms(values: &[f64]) -> f64 {

@@ -2,48 +2,14 @@
 
 use crate::noise::usual_variance;
 use crate::normal::Normal;
-use crate::quiet::{MIN_TORQUE_SHARE, quiet};
+use crate::quiet::quiet;
 use crate::robust::{Blocks, Fit, dry_friction, residuals};
 use crate::rows::{LogRows, rms};
 use crate::settings::EventSettings;
 use core::ops::Range;
 
-/// Relative squared residual that a bin must exceed to increase the sum of an interval.
-const BIN_RATIO: f64 = 9.0;
-/// Limit on the relative squared residual of a bin, so that two events with a longer normal part between them are not
-/// joined.
-const MAX_BIN_RATIO: f64 = 18.0;
-/// Amount by which a bin without reliable motion or torque reduces the sum of an interval.
-const UNUSABLE_LOSS: f64 = 3.0;
-/// Minimum sum of relative squared residuals (above [`BIN_RATIO`]) of an interval.
-const MIN_SUM: f64 = 20.0;
-/// Minimum number of bins of an interval.
-const MIN_BINS: usize = 2;
-/// Maximum distance between intervals that are merged into one event, s.
-const MERGE_S: f64 = 0.3;
-/// Minimum ratio of predicted to measured torque (squares) if the drives are off.
-const OFF_RATIO: f64 = 10.0;
-/// Minimum predicted torque with which drives can be reported as off, relative to the usual residual of the joint
-/// (squares).
-const OFF_PREDICTED: f64 = 16.0;
-/// Minimum duration of a rest with the drives off, s.
-const MIN_OFF_S: f64 = 0.3;
-/// Longest interruption by noise, bins, of a rest without torque.
-const OFF_GAP_BINS: usize = 2;
-/// Minimum share of the bins of a range in which a joint must rest to be treated as at rest.
-const MIN_REST_BINS: f64 = 0.75;
-/// Maximum distance of a joint at a stop from the end of its range in the log, relative to the range.
-const STOP_SHARE: f64 = 0.03;
-/// Minimum travel of another joint during the stop, relative to its range in the log.
-const STOP_TRAVEL: f64 = 0.1;
-/// Minimum mean residual torque at a stop, relative to the usual residual of the joint (squares).
-const STOP_RATIO: f64 = 9.0;
-/// Largest torque that holds a joint at rest relative to its dry friction in motion.
-const BREAKAWAY_RATIO: f64 = 2.0;
 /// Rounds of search and refit.
 const ROUNDS: usize = 4;
-/// Maximum number of intervals.
-const MAX_INTERVALS: usize = 12;
 
 /// An interval with unexplained torque, and the evidence.
 #[derive(Clone, Debug)]
@@ -76,7 +42,7 @@ pub(crate) struct Scan {
 }
 
 /// Searches one log. `None` if it has too few rows.
-pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
+pub(crate) fn scan(rows: &LogRows) -> Option<Scan> {
     let blocks = Blocks::new(rows);
     let mut fit = blocks.trimmed_fit()?;
     let mut kept = vec![true; rows.len()];
@@ -100,13 +66,11 @@ pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
         let (sums, refit) = blocks.fit(&kept)?;
         let left = residuals(rows, &refit);
         let variance = usual_variance(rows, &left, &dry_friction(rows, &refit), &kept);
-        let judged: Vec<Interval> = found
-            .iter()
-            .filter_map(|range| judged(rows, range, &kept, (&sums, &refit), (&left, &variance), settings))
-            .collect();
-        let confirmed = confirmed_events(rows, &found, &kept, &variance, settings);
+        let judged: Vec<Interval> =
+            found.iter().filter_map(|range| judged(rows, range, &kept, &sums, &refit, &left, &variance)).collect();
+        let confirmed = confirmed_events(rows, &found, &kept, &variance);
         let is_kept = |one: &&Interval| {
-            one.is_off || one.is_stop || one.passes_warning(settings) && confirmed.contains(&one.bins)
+            one.is_off || one.is_stop || one.passes_warning(&rows.settings) && confirmed.contains(&one.bins)
         };
         let remaining: Vec<Range<usize>> = judged.iter().filter(is_kept).map(|one| one.bins.clone()).collect();
         if remaining.len() == found.len() {
@@ -123,24 +87,18 @@ pub(crate) fn scan(rows: &LogRows, settings: &EventSettings) -> Option<Scan> {
 /// The intervals that are also events if each bin has the weight `1 / variance`. The dry friction of a joint at rest is
 /// any torque up to the breakaway torque. A fit with equal weights follows the values of some rests, and the others
 /// contradict it.
-fn confirmed_events(
-    rows: &LogRows,
-    found: &[Range<usize>],
-    kept: &[bool],
-    variance: &[Vec<f64>],
-    settings: &EventSettings,
-) -> Vec<Range<usize>> {
+fn confirmed_events(rows: &LogRows, found: &[Range<usize>], kept: &[bool], variance: &[Vec<f64>]) -> Vec<Range<usize>> {
     if found.is_empty() {
         return Vec::new();
     }
     let rows = &rows.weighted(variance);
     let Some((sums, fit)) = Blocks::new(rows).fit(kept) else { return Vec::new() };
     let left = residuals(rows, &fit);
-    let friction: Vec<f64> = dry_friction(rows, &fit).iter().map(|friction| BREAKAWAY_RATIO * friction).collect();
+    let friction: Vec<f64> =
+        dry_friction(rows, &fit).iter().map(|friction| rows.settings.intervals.breakaway_ratio * friction).collect();
     let variance = usual_variance(rows, &left, &friction, kept);
-    let judged =
-        found.iter().filter_map(|range| judged(rows, range, kept, (&sums, &fit), (&left, &variance), settings));
-    judged.filter(|one| one.passes_warning(settings)).map(|one| one.bins).collect()
+    let judged = found.iter().filter_map(|range| judged(rows, range, kept, &sums, &fit, &left, &variance));
+    judged.filter(|one| one.passes_warning(&rows.settings)).map(|one| one.bins).collect()
 }
 
 impl Interval {
@@ -155,20 +113,22 @@ impl Interval {
     }
 }
 
-/// Disjoint intervals with the largest sums of relative square residuals above [`BIN_RATIO`], in order of time.
+/// Disjoint intervals with the largest sums of relative square residuals above
+/// [`bin_ratio`](crate::IntervalSettings::bin_ratio), in order of time.
 fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<Range<usize>> {
+    let own = rows.settings.intervals;
     let gain = |bin: usize| {
         if !rows.usable[bin] {
-            return -UNUSABLE_LOSS;
+            return -own.unusable_loss;
         }
         let ratios = (0..rows.joints()).map(|joint| left[joint][bin].powi(2) / variance[joint][bin]);
-        ratios.fold(0.0, f64::max).min(MAX_BIN_RATIO) - BIN_RATIO
+        ratios.fold(0.0, f64::max).min(own.max_bin_ratio) - own.bin_ratio
     };
     let mut gains: Vec<f64> = (0..rows.len()).map(gain).collect();
     let mut found: Vec<Range<usize>> = Vec::new();
-    while found.len() < MAX_INTERVALS {
+    while found.len() < own.max_intervals {
         let Some((range, sum)) = best_interval(&gains) else { break };
-        if sum < MIN_SUM || range.len() < MIN_BINS {
+        if sum < own.min_sum || range.len() < own.min_bins {
             break;
         }
         gains[range.clone()].fill(f64::NEG_INFINITY);
@@ -176,7 +136,7 @@ fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<R
     }
     found.extend(without_torque(rows));
     found.sort_by_key(|range| range.start);
-    let apart = (MERGE_S / rows.bin_s).ceil() as usize;
+    let apart = (own.merge_s / rows.bin_s).ceil() as usize;
     let mut merged: Vec<Range<usize>> = Vec::new();
     for range in found {
         match merged.last_mut() {
@@ -187,18 +147,18 @@ fn candidates(rows: &LogRows, left: &[Vec<f64>], variance: &[Vec<f64>]) -> Vec<R
     merged
 }
 
-/// Ranges of at least [`MIN_OFF_S`] in which all joints rest with little torque: the drives are off, or the posture
-/// requires no torque.
+/// Ranges of at least [`min_duration_s`](crate::DrivesOffSettings::min_duration_s) in which all joints rest with little
+/// torque: the drives are off, or the posture requires no torque.
 fn without_torque(rows: &LogRows) -> Vec<Range<usize>> {
-    let is_quiet = quiet(rows);
+    let (own, is_quiet) = (rows.settings.drives_off, quiet(rows));
     let mut found: Vec<Range<usize>> = Vec::new();
     for bin in (0..rows.len()).filter(|&bin| is_quiet[bin] && !rows.is_moving(bin)) {
         match found.last_mut() {
-            Some(last) if last.end + OFF_GAP_BINS >= bin => last.end = bin + 1,
+            Some(last) if last.end + own.max_gap_bins >= bin => last.end = bin + 1,
             _ => found.push(bin..bin + 1),
         }
     }
-    found.retain(|range| range.len() as f64 * rows.bin_s >= MIN_OFF_S);
+    found.retain(|range| range.len() as f64 * rows.bin_s >= own.min_duration_s);
     found
 }
 
@@ -236,11 +196,12 @@ fn judged(
     rows: &LogRows,
     range: &Range<usize>,
     kept: &[bool],
-    (sums, fit): (&[Normal], &Fit),
-    (left, variance): (&[Vec<f64>], &[Vec<f64>]),
-    settings: &EventSettings,
+    sums: &[Normal],
+    fit: &Fit,
+    left: &[Vec<f64>],
+    variance: &[Vec<f64>],
 ) -> Option<Interval> {
-    let joints = rows.joints();
+    let (settings, joints) = (&rows.settings, rows.joints());
     let mut one = Interval {
         bins: range.clone(),
         excess: vec![0.0; joints],
@@ -268,9 +229,10 @@ fn judged(
         one.ratio[joint] = excess / usual;
         let weight = &rows.weight[joint];
         let mean_weight = weight[range.clone()].iter().sum::<f64>() / range.len() as f64;
-        let worst = worst_window(rows, (&left[joint], weight), kept, range.len()) / mean_weight;
-        one.prominence[joint] = excess / worst.max(0.25 * usual);
-        one.effect[joint] = excess.sqrt() / rms(&rows.tau[joint]).max(MIN_TORQUE_SHARE * largest);
+        let worst = worst_window(rows, &left[joint], weight, kept, range.len()) / mean_weight;
+        one.prominence[joint] = excess / worst.max(rows.settings.intervals.min_other_ratio * usual);
+        one.effect[joint] =
+            excess.sqrt() / rms(&rows.tau[joint]).max(rows.settings.drives_off.min_reference_ratio * largest);
     }
     one.strongest = (0..joints).max_by(|a, b| one.ratio[*a].total_cmp(&one.ratio[*b])).unwrap_or(0);
     one.is_off = off_ranges(rows, range).is_some_and(|[at_rest, _]| is_off(rows, &at_rest, left, variance));
@@ -293,7 +255,7 @@ fn judged(
 /// Whether one joint rests in most bins of a range.
 pub(crate) fn rests(rows: &LogRows, range: &Range<usize>, joint: usize) -> bool {
     let still = range.clone().filter(|&bin| rows.dq[joint][bin].abs() <= rows.rest[joint]).count();
-    still as f64 >= MIN_REST_BINS * range.len() as f64
+    still as f64 >= rows.settings.drives_off.min_rest_share * range.len() as f64
 }
 
 /// Whether another joint moves clearly while joint `resting` is at rest.
@@ -305,7 +267,7 @@ fn others_move(rows: &LogRows, range: &Range<usize>, resting: usize) -> bool {
     };
     let moves = |joint: usize| {
         let q = &rows.q[joint];
-        travel(&mut still().map(|bin| q[bin])) >= STOP_TRAVEL * travel(&mut q.iter().copied())
+        travel(&mut still().map(|bin| q[bin])) >= rows.settings.stop.min_other_travel * travel(&mut q.iter().copied())
     };
     (0..rows.joints()).any(|joint| joint != resting && moves(joint))
 }
@@ -318,18 +280,19 @@ fn mean_effect(rows: &LogRows, range: &Range<usize>, left: &[f64], joint: usize)
 /// Whether one joint rests at the end of its range with a residual of constant sign that is larger than its friction.
 /// The free parameters of the joint could explain such a torque in a single posture, so this is tested separately.
 fn is_stop(rows: &LogRows, range: &Range<usize>, joint: usize, left: &[f64], variance: &[f64]) -> bool {
+    let own = rows.settings.stop;
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
     let q = &rows.q[joint];
     let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(*q), high.max(*q)));
-    let near = STOP_SHARE * (high - low);
+    let near = own.max_distance * (high - low);
     let is_at_end = mean(q) <= low + near || mean(q) >= high - near;
-    is_at_end && rests(rows, range, joint) && mean(left).powi(2) > STOP_RATIO * mean(variance)
+    is_at_end && rests(rows, range, joint) && mean(left).powi(2) > own.min_residual_ratio * mean(variance)
 }
 
 /// Whether all joints rest with small torques, and some joint lacks the torque that carries the weight. A single
 /// posture hardly changes a fit, so this is tested separately.
 fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[Vec<f64>]) -> bool {
-    let joints = rows.joints();
+    let (own, joints) = (rows.settings.drives_off, rows.joints());
     if !(0..joints).all(|joint| rests(rows, range, joint)) {
         return false;
     }
@@ -342,13 +305,13 @@ fn is_off(rows: &LogRows, range: &Range<usize>, left: &[Vec<f64>], variance: &[V
         let usual = mean(&|bin| variance[joint][bin]);
         measured += tau / scale;
         predicted += model / scale;
-        is_missing |= model > OFF_PREDICTED * usual && model > OFF_RATIO * tau;
+        is_missing |= model > own.min_predicted_size * usual && model > own.min_predicted_ratio * tau;
     }
-    is_missing && predicted > OFF_RATIO * measured
+    is_missing && predicted > own.min_predicted_ratio * measured
 }
 
 /// Largest mean weighted square residual of the kept bins over windows of this length.
-fn worst_window(rows: &LogRows, (left, weight): (&[f64], &[f64]), kept: &[bool], length: usize) -> f64 {
+fn worst_window(rows: &LogRows, left: &[f64], weight: &[f64], kept: &[bool], length: usize) -> f64 {
     let is_used = |bin: usize| kept[bin] && rows.usable[bin];
     let square = |bin: usize| if is_used(bin) { weight[bin] * left[bin].powi(2) } else { 0.0 };
     let length = length.min(rows.len());

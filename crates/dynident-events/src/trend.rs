@@ -4,7 +4,6 @@ use crate::kind::EventKind;
 use crate::normal::Normal;
 use crate::rows::{LogRows, rms};
 use crate::scan::Scan;
-use crate::settings::EventSettings;
 
 /// A slow change of one joint's torque.
 #[derive(Clone, Debug)]
@@ -19,14 +18,8 @@ pub(crate) struct Trend {
     pub(crate) step: Option<usize>,
 }
 
-/// Maximum residual of a model with a sudden change, relative to a model with a slow change (squares), for a sudden
-/// change.
-const MAX_STEP_RATIO: f64 = 0.7;
-/// Number of times that are first tried for a sudden change.
+/// Number of times that are first tried for a sudden change; times near the best follow.
 const STEP_TIMES: usize = 40;
-
-/// Parts of a log that are predicted from the other parts.
-const PARTS: usize = 10;
 
 /// Further columns of a bin.
 type Further<'a> = dyn Fn(usize, &mut Vec<f64>) + 'a;
@@ -41,15 +34,16 @@ fn after(first: usize, bin: usize) -> f64 {
 /// Sum of the weighted squared errors with which the other parts of the log predict each part. Of a log with few
 /// strokes, further columns explain much of the residual by chance, but predict nothing.
 fn prediction_error(rows: &LogRows, joint: usize, kept: &[bool], further: &Further<'_>) -> Option<f64> {
-    let part = |number: usize| number * rows.len() / PARTS..(number + 1) * rows.len() / PARTS;
+    let count = rows.settings.trend.parts;
+    let part = |number: usize| number * rows.len() / count..(number + 1) * rows.len() / count;
     let of = |number: usize| Normal::of_range(rows, joint, part(number), |bin| kept[bin], further);
-    let parts: Vec<Normal> = (0..PARTS).map(of).collect();
+    let parts: Vec<Normal> = (0..count).map(of).collect();
     let of_part = |number: usize| {
         let mut others = Normal::zero(parts[number].width());
         parts.iter().enumerate().filter(|(other, _)| *other != number).for_each(|(_, other)| others.add(other));
         others.solution().map(|theta| parts[number].squares(&theta))
     };
-    (0..PARTS).map(of_part).sum()
+    (0..count).map(of_part).sum()
 }
 
 /// Mean square residual and first bin of the best sudden change of one joint's offset.
@@ -70,9 +64,9 @@ fn best_step(rows: &LogRows, joint: usize, kept: &[bool]) -> Option<(f64, usize)
     near.filter_map(at).fold(Some(coarse), least)
 }
 
-/// Slow changes that explain at least [`EventSettings::min_trend_share`] of a joint's squared residual.
-pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> Vec<Trend> {
-    let bins = rows.len();
+/// Slow changes that explain at least [`min_share`](crate::TrendSettings::min_share) of a joint's squared residual.
+pub(crate) fn trends(rows: &LogRows, scan: &Scan) -> Vec<Trend> {
+    let (own, bins) = (rows.settings.trend, rows.len());
     let place = |bin: usize| 2.0 * bin as f64 / (bins - 1).max(1) as f64 - 1.0;
     let polynomials = |bin: usize| {
         let x = place(bin);
@@ -101,14 +95,11 @@ pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> V
         let (kind, least) =
             if drifting <= warming { (EventKind::Drift, drifting) } else { (EventKind::WarmUp, warming) };
         let size_nm = (plain - least).max(0.0).sqrt();
-        if plain <= 0.0
-            || plain - least < settings.min_trend_share * plain
-            || size_nm < settings.min_trend_effect * torque
-        {
+        if plain <= 0.0 || plain - least < own.min_share * plain || size_nm < own.min_effect * torque {
             continue;
         }
         let step = if kind == EventKind::Drift { best_step(rows, joint, &scan.kept) } else { None };
-        let step = step.filter(|(squares, _)| *squares < MAX_STEP_RATIO * least);
+        let step = step.filter(|(squares, _)| *squares < own.max_step_ratio * least);
         let (least, step) = step.map_or((least, None), |(squares, bin)| (squares, Some(bin)));
         let of_step = |bin: usize, values: &mut Vec<f64>| values.push(after(step.unwrap_or(bins), bin));
         let of_kind: &Further<'_> = match (step, kind) {
@@ -118,7 +109,7 @@ pub(crate) fn trends(rows: &LogRows, scan: &Scan, settings: &EventSettings) -> V
         };
         let [plain_error, error] =
             [&none as &Further<'_>, of_kind].map(|of| prediction_error(&weighted, joint, &scan.kept, of));
-        if plain_error.zip(error).is_none_or(|(plain, error)| error > (1.0 - settings.min_trend_share) * plain) {
+        if plain_error.zip(error).is_none_or(|(plain, error)| error > (1.0 - own.min_share) * plain) {
             continue;
         }
         let size_nm = (plain - least).max(0.0).sqrt();

@@ -39,7 +39,8 @@ impl Drives {
     pub(crate) fn of<'a>(
         dof: usize,
         terms: impl Iterator<Item = (&'a TorqueTerm, f64)> + Clone,
-        (q, dq): (&[Symbol], &[Symbol]),
+        q: &[Symbol],
+        dq: &[Symbol],
         with_state: bool,
     ) -> Result<Self, ExportError> {
         let zeros = || vec![Symbol::ZERO; dof];

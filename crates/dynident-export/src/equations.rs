@@ -73,7 +73,7 @@ impl Values {
         inputs: &Inputs,
     ) -> Result<Self, ExportError> {
         let Inputs { q, dq, rest, .. } = inputs;
-        let drives = Drives::of(robot.model().dof(), robot.terms(), (q, dq), false)?;
+        let drives = Drives::of(robot.model().dof(), robot.terms(), q, dq, false)?;
         let of_load = inputs.load(load);
         let mass_matrix = mass_matrix(reduced, q, &drives.inertia);
         let inverse = inverse(reduced, inputs, &drives, &of_load);
@@ -168,7 +168,7 @@ fn step(
     inputs: &Inputs,
 ) -> Result<Option<StepEquation>, ExportError> {
     let terms = robot.state_terms().iter().map(|(term, value)| (term, *value));
-    let drives = Drives::of(robot.model().dof(), terms, (&inputs.q, &inputs.dq), true)?;
+    let drives = Drives::of(robot.model().dof(), terms, &inputs.q, &inputs.dq, true)?;
     let mut values = inverse(reduced, inputs, &drives, &inputs.load(load));
     Ok(drives.memory.map(|(_, deflections)| {
         let elements = deflections.len();

@@ -181,21 +181,7 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
             Contents::Text(line_ends::plain(reader, &head))
         }
         FileFormat::GzipText | FileFormat::ZstdText => {
-            let unpacked = packed::unpacked(path, format, reader)?;
-            let mut reader = BufReader::with_capacity(1 << 18, unpacked);
-            let inner = recognition::head(&mut reader).map_err(refused)?;
-            match recognition::recognised(path, &inner)? {
-                FileFormat::Text => Contents::Text(line_ends::plain(reader, &inner)),
-                recording @ (FileFormat::Mcap | FileFormat::Rosbag2 | FileFormat::Ros1Bag | FileFormat::Ulog) => {
-                    return Ok(Opened { format: recording, contents: bags::open_file(path, recording)? });
-                }
-                FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
-                FileFormat::Json => Contents::Table(json(path, reader)?),
-                other => {
-                    let problem = format!("it contains {}, which is supported only uncompressed", other.name());
-                    return Err(FileError::broken(path, format, "its beginning", problem, "unpack it first"));
-                }
-            }
+            return open_packed(path, format, packed::unpacked(path, format, reader)?);
         }
         FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
         FileFormat::Json => Contents::Table(json(path, reader)?),
@@ -213,6 +199,26 @@ pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError
         FileFormat::Octave => Contents::Table(octave::open(path, reader, budget)?),
         FileFormat::Mat5 => Contents::Table(mat::open(path, reader, budget)?),
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path, budget)?),
+    };
+    Ok(Opened { format, contents })
+}
+
+/// Opens the content of a compressed file.
+fn open_packed(path: &Path, format: FileFormat, unpacked: impl Read + Send + 'static) -> Result<Opened, FileError> {
+    let refused = |source| FileError::Io { file: path.to_owned(), source };
+    let mut reader = BufReader::with_capacity(1 << 18, unpacked);
+    let head = recognition::head(&mut reader).map_err(refused)?;
+    let contents = match recognition::recognised(path, &head)? {
+        FileFormat::Text => Contents::Text(line_ends::plain(reader, &head)),
+        recording @ (FileFormat::Mcap | FileFormat::Rosbag2 | FileFormat::Ros1Bag | FileFormat::Ulog) => {
+            return Ok(Opened { format: recording, contents: bags::open_file(path, recording)? });
+        }
+        FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
+        FileFormat::Json => Contents::Table(json(path, reader)?),
+        other => {
+            let problem = format!("it contains {}, which is supported only uncompressed", other.name());
+            return Err(FileError::broken(path, format, "its beginning", problem, "unpack it first"));
+        }
     };
     Ok(Opened { format, contents })
 }

@@ -6,7 +6,8 @@ use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
 use crate::events::{RecordingEvents, task_without_events};
 use crate::examination::{PositionTorque, position_torques};
-use crate::task::IdentificationTask;
+use crate::settings::GainChoice;
+use crate::task::{IdentificationTask, logs_without_payload};
 use crate::training::training_rows;
 use dynident_estimation::{WeightedSettings, weighted_least_squares};
 use dynident_recording::ImportReport;
@@ -58,8 +59,14 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let logs = Logs::new(robot.model(), recordings, settings.row_settings(), &chosen, None, execution)?;
     let training = training_rows(&logs, settings, robot.clone().into(), &chosen, payloads, None)?;
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
-    let theta = &estimate.values[..training.columns.base()];
-    let known = training.columns.is_plain().then_some(theta);
+    // Hypotheses are tested on the arm without declared payloads.
+    let bare = logs_without_payload(recordings, &chosen);
+    let mut arm = estimate.values[..training.columns.base()].to_vec();
+    if bare.len() < chosen.len() && settings.gains == GainChoice::Stated {
+        let rows = training_rows(&logs, settings, robot.clone().into(), &bare, payloads, None)?;
+        arm = weighted_least_squares(&rows.problem, &WeightedSettings::default())?.values[..arm.len()].to_vec();
+    }
+    let known = training.columns.are_plain(&bare).then_some(&arm[..]);
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
     // The held-out recordings are read before the diagnosis, which can then use the motions in memory.
@@ -67,17 +74,17 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));
     }
-    let task = DiagnosisTask { logs: &logs, settings, robot, training: &chosen, theta: known };
+    let task = DiagnosisTask { logs: &logs, settings, robot, training: &bare, theta: known };
     let diagnosis = if have_jumps(&training) { None } else { Some(diagnose(task)?) };
     let best = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some());
     let position_torques = match known {
-        Some(_) if !best => position_torques(&logs, &training.model, &chosen, &settings.examination)?,
+        Some(_) if !best => position_torques(&logs, &training.model, &bare, &settings.examination)?,
         _ => Vec::new(),
     };
     let has_mistake = diagnosis.as_ref().is_none_or(|found| found.search.best.is_some() || found.is_unexplained());
     // Logs that do not determine the parameters cannot be compared.
-    let settings = settings.estimation.weighted();
-    let loads = if has_mistake { Vec::new() } else { log_loads(&training, &settings).unwrap_or_default() };
+    let (limits, settings) = (&settings.thresholds.log_load, settings.estimation.weighted());
+    let loads = if has_mistake { Vec::new() } else { log_loads(&training, &settings, limits).unwrap_or_default() };
     let rows = training.problem.joint_rows().iter().sum();
     let parameters = robot.base().count();
     Ok(StudyExamination { imports, diagnosis, loads, events, position_torques, rows, parameters })

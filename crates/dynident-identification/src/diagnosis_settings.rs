@@ -4,9 +4,12 @@
 //! The score of a hypothesis is the sum of the logarithms of this share over all joints, plus costs.
 
 use crate::limits::{InvalidLimit, check_limits};
+use serde::{Deserialize, Serialize};
 
 /// Limits of the diagnosis, grouped by topic.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct DiagnosisSettings {
     /// Comparison of hypotheses.
     pub score: ScoreSettings,
@@ -25,7 +28,9 @@ pub struct DiagnosisSettings {
 }
 
 /// Limits for the comparison of hypotheses.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct ScoreSettings {
     /// Smallest improvement of the score with which another hypothesis replaces the study as written. Default 0.6, as
     /// if the unexplained share of one joint fell to 0.55 of its value. On seven sets of real logs, the best wrong
@@ -90,7 +95,9 @@ impl Default for ScoreSettings {
 }
 
 /// Limits that a correction must keep relative to the hypothesis without it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct AcceptanceSettings {
     /// Largest ratio of the unexplained share of all joints with the correction to the share without it. Default 1.05.
     pub max_ratio_of_all: f64,
@@ -131,7 +138,9 @@ impl Default for AcceptanceSettings {
 }
 
 /// Limits of a plausible motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct MotionLimits {
     /// Largest distance beyond a position limit, as a share of the joint's range. Default 0.02, because zeros are
     /// calibrated to about a degree. Positions further beyond are treated as impossible.
@@ -145,6 +154,14 @@ pub struct MotionLimits {
     /// Largest share of interpolated samples in the filtered torque of a row, 0 to 1. Default 0.3. Rows with a larger
     /// share are excluded.
     pub max_interpolated: f64,
+    /// Velocity below which a joint is at rest, relative to its root mean square velocity. Default 0.02. The friction
+    /// of a joint at rest can have any value up to the friction in motion, so its torque does not test a robot model.
+    pub max_rest_velocity: f64,
+    /// Smallest number of instants in motion with which instants with a joint at rest are excluded. Default 100.
+    pub min_moving_instants: usize,
+    /// Smallest share of instants with a joint at rest with which they are excluded. Default 0.15. In a continuous
+    /// motion of seven joints, the reversals alone are about a tenth of the instants.
+    pub min_rest_share: f64,
 }
 
 impl Default for MotionLimits {
@@ -154,13 +171,18 @@ impl Default for MotionLimits {
             max_velocity_ratio: 1.5,
             recorder_rates_hz: [4.0, 50_000.0],
             max_interpolated: 0.3,
+            max_rest_velocity: 0.02,
+            min_moving_instants: 100,
+            min_rest_share: 0.15,
         }
     }
 }
 
 /// Limits for channels that were logged too late or too early. Times are those of an arm of usual size
 /// ([`CharacteristicScale::seconds`](dynident_model::CharacteristicScale::seconds)), which moves at about 1 Hz.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct LateChannelSettings {
     /// Largest shift of all torques relative to the positions that is tried, in both directions, s. Default 2.
     pub max_lag_s: f64,
@@ -201,7 +223,9 @@ impl Default for LateChannelSettings {
 }
 
 /// Limits for the comparison with the robot description.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct DescriptionSettings {
     /// Smallest share of a joint's torque, with friction removed, that the nominal bodies times a factor must explain.
     /// Default 0.5. If they explain less, the factor is ignored.
@@ -242,12 +266,19 @@ impl Default for DescriptionSettings {
 }
 
 /// Limits for channels that no correction can repair.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct ChannelSettings {
     /// Unexplained share of a joint above which its channels are compared with those of other joints, and above which
     /// torques without negative values are treated as magnitudes. Default 0.1. (Below it, equal channels may be two
     /// joints that move in the same way.)
     pub min_unexplained_of_duplicate: f64,
+    /// Largest relative difference between duplicate columns. Default 1e-6, because filters round.
+    pub max_difference_of_duplicate: f64,
+    /// Largest relative difference between a position and a torque from the same column, which pass different filters.
+    /// Default 0.01.
+    pub max_difference_of_filters: f64,
     /// Largest torque of the wrong sign that a filter may cause in magnitudes, relative to the largest torque of the
     /// joint. Default 0.05.
     pub max_undershoot: f64,
@@ -275,6 +306,8 @@ impl Default for ChannelSettings {
     fn default() -> Self {
         Self {
             min_unexplained_of_duplicate: 0.1,
+            max_difference_of_duplicate: 1.0e-6,
+            max_difference_of_filters: 1.0e-2,
             max_undershoot: 0.05,
             min_doubted_ratio: 2.4,
             min_foreign_ratio: 2.6,
@@ -287,7 +320,9 @@ impl Default for ChannelSettings {
 }
 
 /// Limits for held-out logs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct HeldOutSettings {
     /// Unexplained share of a joint in a held-out log, divided by that in the training logs, above which the log is
     /// reported as not explained. Default 3. Real data sets reach 2.4 for all joints together.
@@ -311,6 +346,12 @@ pub struct HeldOutSettings {
     pub max_distance_of_repeat: f64,
     /// Share of such instants from which a held-out log repeats the training motion; 0.9.
     pub min_share_of_repeat: f64,
+    /// Smallest number of joints with which a repeated motion is reported; 3. The motions of fewer joints pass near
+    /// each other without being equal.
+    pub min_joints_of_repeat: usize,
+    /// Ratio of the number of residuals to the number of independent residuals, for the standard deviation of a
+    /// payload; 10. Neighbouring residuals are correlated.
+    pub residuals_per_independent: f64,
     /// Smallest estimated mass of a payload, in its standard deviations, for the payload to be reported; 5.
     pub min_payload_deviations: f64,
 }
@@ -326,6 +367,8 @@ impl Default for HeldOutSettings {
             max_ratio_of_corrected_joint: 0.25,
             max_distance_of_repeat: 0.03,
             min_share_of_repeat: 0.9,
+            min_joints_of_repeat: 3,
+            residuals_per_independent: 10.0,
             min_payload_deviations: 5.0,
         }
     }
@@ -367,6 +410,8 @@ impl DiagnosisSettings {
             ("motion.recorder_rates_hz[0]", lowest_hz),
             ("width of motion.recorder_rates_hz", highest_hz - lowest_hz),
             ("motion.max_interpolated", motion.max_interpolated),
+            ("motion.max_rest_velocity", motion.max_rest_velocity),
+            ("motion.min_rest_share", motion.min_rest_share),
             ("late_channel.max_lag_s", late_channel.max_lag_s),
             ("late_channel.lag_step_s", late_channel.lag_step_s),
             ("late_channel.max_lag_of_joint_s", late_channel.max_lag_of_joint_s),
@@ -383,6 +428,8 @@ impl DiagnosisSettings {
             ("description.usual_mass_ratios[0]", lightest),
             ("width of description.usual_mass_ratios", heaviest - lightest),
             ("channels.min_unexplained_of_duplicate", channels.min_unexplained_of_duplicate),
+            ("channels.max_difference_of_duplicate", channels.max_difference_of_duplicate),
+            ("channels.max_difference_of_filters", channels.max_difference_of_filters),
             ("channels.max_undershoot", channels.max_undershoot),
             ("channels.min_doubted_ratio", channels.min_doubted_ratio),
             ("channels.min_foreign_ratio", channels.min_foreign_ratio),
@@ -398,6 +445,7 @@ impl DiagnosisSettings {
             ("held_out.max_ratio_of_corrected_joint", held_out.max_ratio_of_corrected_joint),
             ("held_out.max_distance_of_repeat", held_out.max_distance_of_repeat),
             ("held_out.min_share_of_repeat", held_out.min_share_of_repeat),
+            ("held_out.residuals_per_independent", held_out.residuals_per_independent),
             ("held_out.min_payload_deviations", held_out.min_payload_deviations),
         ])
     }

@@ -1,9 +1,12 @@
 //! Limits of the examination of an estimate.
 
 use crate::limits::{InvalidLimit, check_limits};
+use serde::{Deserialize, Serialize};
 
 /// Limits of the examination of an estimate, which decide about its findings.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct ExaminationSettings {
     /// Largest ratio of the residual with the opposite torque sign to the residual with the sign as logged, for the
     /// sign to be reported as reversed. Default 0.5.

@@ -190,7 +190,7 @@ pub use stages::{ConsistentParameters, TrainingExamination, consistent_stage};
 pub use task::IdentificationTask;
 pub use thresholds::{
     CutoffThresholds, DecisionThresholds, DescriptionThresholds, DoubtThresholds, DriveInertiaThresholds,
-    EstimationThresholds, FrictionThresholds, GainThresholds, LagThresholds, LogVariationThresholds, MotionThresholds,
-    NoiseThresholds, ThresholdError,
+    EstimationThresholds, FrictionThresholds, GainThresholds, LagThresholds, LogLoadThresholds, LogVariationThresholds,
+    MotionThresholds, NoiseThresholds, ThresholdError,
 };
 pub use training::{Training, training_rows};

@@ -15,7 +15,8 @@ use crate::examination::{
     sign_evidence, tested_on,
 };
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
-use crate::task::IdentificationTask;
+use crate::task::{IdentificationTask, logs_without_payload};
+use crate::thresholds::DescriptionThresholds;
 use crate::training::Training;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
@@ -178,7 +179,8 @@ impl Stage<'_> {
             DiagnosisChoice::WhenDoubtful if !self.is_doubted(examined, robot) => Ok(None),
             DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
                 let theta = plain.filter(|_| own_terms);
-                Ok(Some(diagnose(DiagnosisTask { logs, settings, robot, training: chosen, theta })?))
+                let bare = logs_without_payload(logs.recordings, chosen);
+                Ok(Some(diagnose(DiagnosisTask { logs, settings, robot, training: &bare, theta })?))
             }
         }
     }
@@ -251,7 +253,7 @@ pub fn consistent_stage(
     };
     let limits = &settings.thresholds.description;
     let differences = match knowledge.filter(|_| fit.is_some()) {
-        Some(knowledge) => description_differences(robot, &arm, knowledge),
+        Some(knowledge) => description_differences(robot, &arm, knowledge, limits),
         None => None,
     };
     let followed = knowledge.zip(differences.as_ref()).zip(fit.as_ref()).and_then(|((knowledge, differences), fit)| {
@@ -305,13 +307,14 @@ fn description_differences(
     robot: &ParametricModel,
     arm: &Estimate,
     knowledge: &ConsistencySettings,
+    limits: &DescriptionThresholds,
 ) -> Option<Differences> {
     let is_fixed = |row: &usize| arm.rank.fixed.iter().any(|fixed| fixed.column == *row);
     let rows: Vec<usize> = (0..robot.base().count()).filter(|row| !is_fixed(row)).collect();
     let values = DVector::from_fn(rows.len(), |k, _| arm.values[rows[k]]);
     let all = arm.joint_covariance();
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| all[(rows[a], rows[b])]);
-    Differences::from_description(robot, &rows, &values, &covariance, knowledge).ok().flatten()
+    Differences::from_description(robot, &rows, &values, &covariance, knowledge, limits).ok().flatten()
 }
 
 /// Whether a physically consistent set that follows an explanation (`followed`) fits the logs as well as the set

@@ -25,3 +25,9 @@ impl IdentificationTask {
         Self { robot, recordings, payloads: Vec::new(), settings: IdentificationSettings::default() }
     }
 }
+
+/// Those of the recordings `chosen` without a declared payload; all if each carries one.
+pub(crate) fn logs_without_payload(recordings: &[Recording], chosen: &[usize]) -> Vec<usize> {
+    let bare: Vec<usize> = chosen.iter().copied().filter(|&log| recordings[log].payload.is_none()).collect();
+    if bare.is_empty() { chosen.to_vec() } else { bare }
+}

@@ -1,5 +1,6 @@
 //! Thresholds for decisions and tests.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Default maximum lag, s, for an arm of usual size. The lags of drives and buses are shorter.
@@ -40,11 +41,15 @@ pub struct DecisionThresholds {
     pub doubt: DoubtThresholds,
     /// Which bodies differ from the robot description.
     pub description: DescriptionThresholds,
+    /// Loads that a single training log carries.
+    pub log_load: LogLoadThresholds,
 }
 
 /// Thresholds for bodies that differ from the robot description
 /// ([`Differences`](crate::changes::Differences)).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct DescriptionThresholds {
     /// Minimum probability of all explanations by one or two bodies together, for the exported model to follow the most
@@ -56,16 +61,80 @@ pub struct DescriptionThresholds {
     /// Largest relative difference (standard deviation) that all bodies may have in an explanation by one or two
     /// bodies. 0.03 by default: masses of good descriptions are accurate to a few percent.
     pub max_small_share: f64,
+    /// Probability of a change below which a body of the exported model keeps the values of the description. 0.1 by
+    /// default: twice the prior probability, which is also the result for a body without effect on the torque.
+    pub max_unchanged_probability: f64,
+    /// Minimum mass of a changed body of the exported model, relative to its mass in the description. 0.1 by default.
+    pub min_mass_ratio: f64,
+    /// Prior probability of all small differences of all bodies from a description; that of large ones is the
+    /// complement. 0.5 by default: neither few nor all bodies are preferred.
+    pub small_probability: f64,
+    /// Prior probability of small differences of all bodies between two estimates, and of large ones. 0.05 by default:
+    /// two estimates usually belong to the same robot, whose bodies did not all change.
+    pub other_robot_probability: f64,
+    /// Prior probability of a change of terms, and of each way in which a body changes: a load, a common factor of all
+    /// its values, or both. 0.025 by default.
+    pub change_probability: f64,
+    /// Expected value of the common factor of a changed body, minus 1. 0.5 by default.
+    pub expected_factor: f64,
+    /// Expected common factor with a load, relative to that without. 5.0 by default: most of a load near the centre of
+    /// mass of its body is a factor, and the rest is small.
+    pub factor_with_load: f64,
+    /// Factors of the error bars of a difference from a description, with the same probability. 0.5, 1 and 2 by
+    /// default: error bars for correlated residuals can be twice too wide.
+    pub error_factors: [f64; 3],
+    /// Expected difference of a friction or drive parameter relative to its value. 50.0 by default, because robot
+    /// descriptions do not contain the friction of the real drive.
+    pub unknown_term_ratio: f64,
+    /// Among explanations with the same changed bodies, smaller differences of the other bodies are preferred if their
+    /// probability is at least this share of the largest one. 0.1 by default, because descriptions are usually right.
+    pub min_share_of_largest: f64,
+    /// Minimum probability with which an explanation is listed in `result.json`. 0.01 by default.
+    pub min_listed_probability: f64,
 }
 
 impl Default for DescriptionThresholds {
     fn default() -> Self {
-        Self { min_probability: 0.7, max_small_share: 0.03 }
+        Self {
+            min_probability: 0.7,
+            max_small_share: 0.03,
+            max_unchanged_probability: 0.1,
+            min_mass_ratio: 0.1,
+            small_probability: 0.5,
+            other_robot_probability: 0.05,
+            change_probability: 0.025,
+            expected_factor: 0.5,
+            factor_with_load: 5.0,
+            error_factors: [0.5, 1.0, 2.0],
+            unknown_term_ratio: 50.0,
+            min_share_of_largest: 0.1,
+            min_listed_probability: 0.01,
+        }
+    }
+}
+
+/// Thresholds for a load that a single training log carries ([`LogLoad`](crate::changes::LogLoad)).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
+pub struct LogLoadThresholds {
+    /// Minimum probability of all explanations that contain the body, for a load to be reported. 0.95 by default.
+    pub min_probability: f64,
+    /// Minimum mass of a load divided by its standard deviation, for the load to be reported. 5.0 by default.
+    pub min_deviations: f64,
+}
+
+impl Default for LogLoadThresholds {
+    fn default() -> Self {
+        Self { min_probability: 0.95, min_deviations: 5.0 }
     }
 }
 
 /// Threshold of the test for drive inertia.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct DriveInertiaThresholds {
     /// Minimum test statistic with which drive inertia is added to the model, in standard deviations of its
@@ -83,7 +152,9 @@ impl Default for DriveInertiaThresholds {
 }
 
 /// Thresholds for the selection of cut-offs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct CutoffThresholds {
     /// Minimum ratio of the larger to the smaller of two cut-offs with which friction is selected again at the new
@@ -107,7 +178,9 @@ impl Default for CutoffThresholds {
 }
 
 /// Thresholds for friction terms.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct FrictionThresholds {
     /// Critical values of Wald's test for an additional friction term with 1, 2 and 3 degrees of freedom. A term with a
@@ -140,7 +213,9 @@ impl Default for FrictionThresholds {
 }
 
 /// Thresholds above which a fit is doubtful, so that hypotheses about mistakes in the study are tested.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct DoubtThresholds {
     /// Mean over joints of `ln(residual of a physically consistent robot / residual of separate joint parameters)`
@@ -166,10 +241,25 @@ impl DecisionThresholds {
     /// # Errors
     /// The first invalid value.
     pub fn validate(&self) -> Result<(), ThresholdError> {
-        let Self { drive_inertia, cutoff, friction, doubt, description } = self;
+        let Self { drive_inertia, cutoff, friction, doubt, description, log_load } = self;
         check(&[
             ("description.min_probability", description.min_probability, 0.5),
             ("description.max_small_share", description.max_small_share, 0.0),
+            ("description.max_unchanged_probability", description.max_unchanged_probability, 0.0),
+            ("description.min_mass_ratio", description.min_mass_ratio, 1e-6),
+            ("description.small_probability", description.small_probability, 1e-6),
+            ("description.small_probability below 1", 1.0 - description.small_probability, 1e-6),
+            ("description.other_robot_probability", description.other_robot_probability, 1e-6),
+            ("description.other_robot_probability below 0.5", 0.5 - description.other_robot_probability, 1e-6),
+            ("description.change_probability", description.change_probability, 1e-6),
+            ("description.change_probability below 1", 1.0 - description.change_probability, 1e-6),
+            ("description.expected_factor", description.expected_factor, 1e-6),
+            ("description.factor_with_load", description.factor_with_load, 1e-6),
+            ("description.unknown_term_ratio", description.unknown_term_ratio, 0.0),
+            ("description.min_share_of_largest", description.min_share_of_largest, 0.0),
+            ("description.min_listed_probability", description.min_listed_probability, 0.0),
+            ("log_load.min_probability", log_load.min_probability, 0.0),
+            ("log_load.min_deviations", log_load.min_deviations, 0.0),
             ("drive_inertia.min_std", drive_inertia.min_std, 0.0),
             ("cutoff.min_friction_ratio", cutoff.min_friction_ratio, 1.0),
             ("cutoff.max_step_noise_ratio", cutoff.max_step_noise_ratio, 0.0),
@@ -181,6 +271,7 @@ impl DecisionThresholds {
             ("doubt.min_rows_per_parameter", doubt.min_rows_per_parameter, 1.0),
             ("doubt.max_held_out_ratio", doubt.max_held_out_ratio, 0.0),
         ])?;
+        check(&description.error_factors.map(|value| ("description.error_factors", value, 1e-6)))?;
         let term = friction.term_chi_square.map(|value| ("friction.term_chi_square", value, 1e-9));
         let second = friction.second_selection_chi_square;
         check(&term)?;
@@ -205,7 +296,9 @@ pub struct EstimationThresholds {
 }
 
 /// Thresholds for the lag between motion and torque.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct LagThresholds {
     /// Minimum change of a parameter by a lag correction with which the lag is corrected, in error bars of the
@@ -244,7 +337,9 @@ impl Default for LagThresholds {
 }
 
 /// Thresholds for the test whether noise in the regressor biases least squares.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct NoiseThresholds {
     /// Regression coefficient of the measured torque on the torque of the fast motion, below which the fast motion is
@@ -280,7 +375,9 @@ impl Default for NoiseThresholds {
 }
 
 /// Thresholds for the variation of parameters between logs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct LogVariationThresholds {
     /// Minimum number of pairs (one parameter in two logs) for estimating the variation of one kind of parameters. 5 by
@@ -303,7 +400,9 @@ impl Default for LogVariationThresholds {
 }
 
 /// Requirements on the motion of the simultaneous and maximum-likelihood methods.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct MotionThresholds {
     /// Largest residual of the positions from their Fourier series, relative to the size of the motion. Above it the
@@ -324,7 +423,9 @@ impl Default for MotionThresholds {
 }
 
 /// Threshold for drive gains.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct GainThresholds {
     /// Largest half-width of the 95 % interval of a gain, relative to the gain. Above it the gain is reported as not

@@ -165,7 +165,7 @@ impl Client {
     }
 
     /// Fails, if it is time. Returns true if the run is over.
-    fn misbehave(&self, (part, sample): (&str, usize), time_s: f64) -> Result<bool> {
+    fn misbehave(&self, part: &str, sample: usize, time_s: f64) -> Result<bool> {
         if sample != self.at || part != self.part {
             return Ok(false);
         }
@@ -271,7 +271,7 @@ impl Client {
                 controller.torque(due_s, target.target(), measured, &mut tau);
                 let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
                 let (own, path) = (turned(&tau), turned(target.target().q));
-                if self.misbehave((part, sample), time_s)? {
+                if self.misbehave(part, sample, time_s)? {
                     return Ok(());
                 }
                 let mut message = json!({ "type": "sample", "t_s": time_s, "q": q, "tau": own });
@@ -307,7 +307,7 @@ impl Client {
         let mut sample = 0;
         loop {
             let time_s = f64::from(sample) / rate_hz;
-            if self.misbehave((&self.part, sample as usize), time_s)? {
+            if self.misbehave(&self.part, sample as usize, time_s)? {
                 return Ok(());
             }
             let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));

@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (arm, path, duration_s) in STUDIES {
         let mut first: Option<Vec<f64>> = None;
         for (name, family) in FAMILIES {
-            match compared(Path::new(path), family, (duration_s, seconds), seeds)? {
+            match compared(Path::new(path), family, duration_s, seconds, seeds)? {
                 None => println!("| {arm} | {name} | none inside the limits | | |"),
                 Some(Outcome { log_det, errors, tracking }) => {
                     let reference = first.get_or_insert_with(|| errors.clone());
@@ -76,7 +76,8 @@ struct Outcome {
 fn compared(
     path: &Path,
     family: &str,
-    (duration_s, seconds): (Option<f64>, Option<f64>),
+    duration_s: Option<f64>,
+    seconds: Option<f64>,
     seeds: u64,
 ) -> Result<Option<Outcome>, Box<dyn Error>> {
     let mut study = Study::load(path)?;

@@ -1,11 +1,12 @@
 //! The jobs of the command as functions: studies as input, JSON and models as output.
 
 use crate::arrays::{array, sample_major};
+use crate::description::described;
 use crate::errors;
 use crate::function_robot::{Raised, robot_of};
 use crate::jobs::{Watch, run, run_to_its_stop, threads as threads_or_all};
 use crate::model::{FittedModel, RESULT};
-use crate::robot::{Robot, described};
+use crate::robot::Robot;
 use crate::study::{Samples as StudySamples, Study, memory_log};
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;

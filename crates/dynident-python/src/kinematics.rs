@@ -61,7 +61,8 @@ pub(crate) fn pose(model: &Model, workspace: &mut Workspace, link: &LinkPlace, q
 pub(crate) fn jacobian(
     model: &Model,
     workspace: &mut Workspace,
-    (link, point): (&LinkPlace, [f64; 3]),
+    link: &LinkPlace,
+    point: [f64; 3],
     q: &[f64],
     out: &mut [f64],
 ) {

@@ -7,6 +7,7 @@
 mod arrays;
 mod assembled;
 mod callables;
+mod description;
 mod errors;
 mod factors;
 mod function_robot;
@@ -18,6 +19,7 @@ mod pool;
 mod robot;
 mod study;
 mod watch;
+mod watch_settings;
 
 /// The extension module.
 #[pyo3::pymodule]

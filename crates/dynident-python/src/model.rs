@@ -5,13 +5,14 @@ use crate::callables::{Callables, guarded};
 use crate::errors;
 use crate::jobs;
 use crate::study::Study;
-use crate::watch::{OnlineSettings, OnlineWatch};
+use crate::watch::OnlineWatch;
+use crate::watch_settings::OnlineSettings;
 use dynident::export::{ControllerBrand, Target};
 use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
 use dynident::{
     Error, Figure, IdentificationOutcome, IterationsFile, PrintStyle, ResultFile, RobotAppearance, RunOptions,
-    TorquePredictor, export_payload_of, export_result, export_simulator_of, identification_report, validation_traces,
+    TorquePredictor, export_payload, export_result, export_simulator, identification_report, validation_traces,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -304,7 +305,7 @@ impl FittedModel {
     /// Drive parameters in the conventions of simulators: JSON and a Markdown table.
     fn simulator(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let of = (&self.study, &*self.path);
-        let made = py.detach(|| guarded(|| export_simulator_of(&self.result, Path::new(RESULT), of.0, of.1, None)))?;
+        let made = py.detach(|| guarded(|| export_simulator(&self.result, Path::new(RESULT), of.0, of.1, None)))?;
         let made = made.map_err(|error| errors::job(py, &error))?;
         let json = made.json().map_err(|error| errors::ResultError::new_err(error.to_string()))?;
         Ok((json.text, made.table().text))
@@ -323,7 +324,7 @@ impl FittedModel {
             let known = KNOWN.map(|(known, _)| known).join(", ");
             errors::ResultError::new_err(format!("no controller `{reader}`: give one of {known}"))
         })?;
-        let made = export_payload_of(&self.result, Path::new(RESULT), name, wanted.1);
+        let made = export_payload(&self.result, Path::new(RESULT), name, wanted.1);
         let made = made.map_err(|error| errors::job(py, &error))?;
         Ok((made.text, made.notes))
     }

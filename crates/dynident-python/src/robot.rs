@@ -3,8 +3,8 @@
 use crate::arrays::{Motion, array, joint_major};
 use crate::assembled::{assembled, json_of};
 use crate::callables::Callables;
+use crate::description::{described, is_xml, of_format, of_text, study_of, xacro_settings};
 use crate::errors;
-use crate::jobs::interruptible;
 use crate::kinematics::{self, POSE_VALUES};
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
@@ -12,7 +12,7 @@ use dynident::dynamics::{
 };
 use dynident::model::terms::JointMotion;
 use dynident::model::{DescriptionFormat, JointLimits, Model, Robot as Description, read_robot};
-use dynident::{Folders, LoadSettings, ProgramPermission, StudyRobot, XacroSettings, load_robot};
+use dynident::{Folders, StudyRobot};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -159,53 +159,6 @@ fn lend<W, R>(kept: &Mutex<Vec<W>>, make: impl FnOnce() -> W, work: impl FnOnce(
         all.push(workspace);
     }
     result
-}
-
-/// The sections of a study with only a robot.
-fn study_of(path: &Path, settings: &str) -> PyResult<String> {
-    let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
-    let mut section: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
-    section.insert("file".to_owned(), path.display().to_string().into());
-    serde_json::to_string(&serde_json::json!({ "robot": section })).map_err(wrong)
-}
-
-/// Reads a robot file; the program `xacro` expands one with macros if permitted. Ctrl-C stops it.
-pub(crate) fn described(
-    py: Python<'_>,
-    path: &Path,
-    xacro: XacroSettings,
-    allow_command: bool,
-) -> PyResult<Description> {
-    let programs = ProgramPermission::from_flag(allow_command);
-    interruptible(py, |is_stopped| load_robot(path, &LoadSettings { xacro, programs, is_stopped: Some(is_stopped) }))
-}
-
-/// The arguments of xacro among the keys of ``[robot]``.
-fn xacro_settings(path: &Path, settings: &str) -> PyResult<XacroSettings> {
-    let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
-    let settings: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
-    let own = settings.into_iter().filter(|(key, _)| key.starts_with("xacro"));
-    let own = serde_json::to_string(&own.collect::<serde_json::Map<_, _>>()).map_err(wrong)?;
-    let study = dynident::Study::from_json(&study_of(path, &own)?, path);
-    Ok(study.map_err(|error| errors::StudyError::new_err(error.to_string()))?.robot.xacro_settings())
-}
-
-/// Reads the text of a robot description of the format `wanted`.
-fn of_text(py: Python<'_>, text: &str, wanted: DescriptionFormat, name: &str) -> PyResult<Description> {
-    of_format(read_robot(text.to_owned(), Path::new(name)).map_err(|error| errors::robot(py, &error))?, wanted)
-}
-
-fn of_format(found: Description, wanted: DescriptionFormat) -> PyResult<Description> {
-    if found.format == wanted {
-        Ok(found)
-    } else {
-        let (path, format) = (found.path.display(), found.format);
-        Err(errors::not_this_format(format!("{path}: is {format:?}, not {wanted:?}: use Robot.load")))
-    }
-}
-
-fn is_xml(text: &str) -> bool {
-    text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }
 
 /// Processes blocks of samples, with all threads of the current pool, if any.
@@ -378,7 +331,7 @@ impl Robot {
         let (dof, link) = (self.model.dof(), kinematics::link(&self.model, link)?);
         Motion::of(dof, q, None, None)?.fill(py, &[6, dof], |[q, ..], out| {
             self.for_each(out, 6 * dof, |workspace, row, out| {
-                kinematics::jacobian(&self.model, workspace, (&link, point), &q[row * dof..(row + 1) * dof], out);
+                kinematics::jacobian(&self.model, workspace, &link, point, &q[row * dof..(row + 1) * dof], out);
             });
         })
     }

@@ -152,9 +152,8 @@ fn main() {
                 let settings = settings.replace("SERIES", command.series());
                 let differentiator: DifferentiatorSettings =
                     toml::from_str(&format!("method = {method:?}\n{settings}")).unwrap();
-                let cell = |noise, tracking: Tracking| {
-                    measured((command, extent), &differentiator, &reference, noise, tracking)
-                };
+                let cell =
+                    |noise, tracking: Tracking| measured(command, extent, &differentiator, &reference, noise, tracking);
                 NOISE_DEG.iter().map(|noise| TRACKING.iter().map(|(_, t)| cell(*noise, *t)).collect()).collect()
             })
             .collect();
@@ -219,7 +218,8 @@ fn winners(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
 }
 
 fn measured(
-    (command, extent): (CommandKind, Extent),
+    command: CommandKind,
+    extent: Extent,
     differentiator: &DifferentiatorSettings,
     reference: &Arc<Reference>,
     noise_deg: f64,

@@ -1,6 +1,6 @@
 //! Content of `iterations.json`.
 
-use super::identification::BaseParameterResult;
+use super::parameters::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::ResultFileError;
 use crate::read::read_result;

@@ -6,74 +6,7 @@ use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::{JointResiduals, LogValidation};
 use dynident_recording::Level;
 use dynident_recording::log::Quantity;
-use dynident_study::{Expected, StudyError};
-
-/// Thresholds of [`ResultFile::problems_of_the_model_with`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct ProblemSettings {
-    /// Torque error of the physically consistent model divided by that of the unconstrained estimate (same rows, all
-    /// joints together). A larger ratio is a problem. Default 1.5: real test logs have 0.8 to 1.14, logs with a dead
-    /// torque channel 1.6.
-    pub max_error_ratio: f64,
-    /// Torque error of the physically consistent model divided by that of the unconstrained estimate, for a single
-    /// joint. A larger ratio is a problem. Default 2.5: real test logs have 0.6 to 1.7, logs with a dead torque channel
-    /// 5.2.
-    pub max_joint_error_ratio: f64,
-    /// Unexplained torque of training or held-out logs, percent of the torque. A larger value is a problem. Default 60.
-    pub max_unexplained_percent: f64,
-    /// Residual of a held-out log divided by that of the training logs (root mean square over the joints). A larger
-    /// ratio is a problem. Default 4: ten real data sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
-    pub max_held_out_ratio: f64,
-    /// Limit of the residual ratio in `max_held_out_ratio` if `check` found a joint torque that no physically
-    /// consistent model explains. Default 2.
-    pub max_held_out_ratio_if_inconsistent: f64,
-    /// Unexplained torque of a held-out log, percent. Below it, `max_held_out_ratio` is not applied to the log. Default
-    /// 1.
-    pub min_held_out_percent: f64,
-    /// Range of the positions, rad (m): if every joint's range in all training logs is smaller, the robot is treated as
-    /// at rest. Default 0.01: motions of the examples with real logs have ranges above 0.3.
-    pub max_range_at_rest: f64,
-    /// Smallest torque of a joint for the comparison of errors, relative to the largest joint torque. Default 1e-3:
-    /// smaller torques are friction only.
-    pub min_torque_share: f64,
-}
-
-impl Default for ProblemSettings {
-    fn default() -> Self {
-        Self {
-            max_error_ratio: 1.5,
-            max_joint_error_ratio: 2.5,
-            max_unexplained_percent: 60.0,
-            max_held_out_ratio: 4.0,
-            max_held_out_ratio_if_inconsistent: 2.0,
-            min_held_out_percent: 1.0,
-            max_range_at_rest: 0.01,
-            min_torque_share: 1.0e-3,
-        }
-    }
-}
-
-impl ProblemSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// The first setting that is not a positive number, with its value.
-    pub fn validate(&self) -> Result<(), StudyError> {
-        for (key, value) in [
-            ("max_error_ratio", self.max_error_ratio),
-            ("max_joint_error_ratio", self.max_joint_error_ratio),
-            ("max_unexplained_percent", self.max_unexplained_percent),
-            ("max_held_out_ratio", self.max_held_out_ratio),
-            ("max_held_out_ratio_if_inconsistent", self.max_held_out_ratio_if_inconsistent),
-            ("min_held_out_percent", self.min_held_out_percent),
-            ("max_range_at_rest", self.max_range_at_rest),
-            ("min_torque_share", self.min_torque_share),
-        ] {
-            Expected::Positive.check(key, value)?;
-        }
-        Ok(())
-    }
-}
+use dynident_study::ProblemSettings;
 
 impl LogSummary {
     /// Problems found in the log.
@@ -92,16 +25,12 @@ impl ResultFile {
         problems
     }
 
-    /// Problems among [`problems`](Self::problems) that do not concern a single log, with default thresholds.
-    pub fn problems_of_the_model(&self) -> Vec<String> {
-        self.problems_of_the_model_with(&ProblemSettings::default())
-    }
-
     /// Problems that do not concern a single log: problems that `check` found in the study, an estimator that did not
     /// converge, and a physically consistent set (which is exported) with clearly larger errors than the unconstrained
     /// estimate. Errors on held-out logs are compared. Without held-out logs, errors on the training rows are compared,
     /// and only a significant difference is a problem.
-    pub fn problems_of_the_model_with(&self, settings: &ProblemSettings) -> Vec<String> {
+    pub fn problems_of_the_model(&self) -> Vec<String> {
+        let settings = &self.thresholds.problems;
         let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
             problems.push(format!(
@@ -306,10 +235,11 @@ fn worse_when_consistent(
     let largest = free.joints.iter().map(torque_norm).fold(0.0, f64::max);
     let times = |before: f64, after: f64| if before > 0.0 { after / before } else { 1.0 };
     let joints = free.joints.iter().zip(&written.joints);
+    let is_shown = |percent: Option<f64>| percent.is_none_or(|percent| percent >= settings.min_held_out_percent);
     let worst = joints
         .filter(|(free, _)| torque_norm(free) > settings.min_torque_share * largest)
         .map(|(free, held)| (times(free.1, held.1), free, held))
-        .filter(|(ratio, ..)| *ratio > settings.max_joint_error_ratio)
+        .filter(|(ratio, _, held)| *ratio > settings.max_joint_error_ratio && is_shown(held.2))
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let percent = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |value| format!("{value:.2}"));
     let sentence = |place: String, before: Option<f64>, after: Option<f64>| {
@@ -326,7 +256,7 @@ fn worse_when_consistent(
     }
     // Both errors are relative to the same torque, so their ratio equals the ratio of the root mean square errors.
     let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
-    (ratio? > settings.max_error_ratio)
+    (ratio? > settings.max_error_ratio && is_shown(written.relative_percent))
         .then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
 }
 

@@ -127,6 +127,9 @@ pub struct ServoLog {
     /// Root mean square difference between measured position and command, rad (m): the error of a simulation in which
     /// joints follow commands exactly.
     pub command_errors: Vec<f64>,
+    /// Range of the measured position of each joint, rad (m); empty in older files.
+    #[serde(default)]
+    pub ranges: Vec<f64>,
 }
 
 /// Measured and simulated motion of a log.
@@ -190,6 +193,26 @@ pub struct ServoDrive {
     pub mean_friction: f64,
     /// Values of the drive with error bars.
     pub values: Vec<ServoNumber>,
+}
+
+impl ServoDrive {
+    /// The values for a table: in place of the mean delay and the read delay, the delay of this joint from a command to
+    /// its measurement, `delay_s - read_delay_s`, with the error bars of both.
+    pub fn shown_values(&self) -> Vec<ServoNumber> {
+        let (delays, mut shown): (Vec<_>, Vec<_>) =
+            self.values.iter().cloned().partition(|value| value.name.ends_with("delay"));
+        let sum = |of: fn(&ServoNumber) -> f64| delays.iter().map(|delay| of(delay).powi(2)).sum::<f64>().sqrt();
+        shown.extend(delays.first().map(|first| ServoNumber {
+            name: "delay".to_owned(),
+            unit: first.unit.clone(),
+            value: self.delay_s - self.read_delay_s,
+            half_width_95: sum(|delay| delay.half_width_95),
+            half_width_95_at_scale: sum(|delay| delay.half_width_95_at_scale),
+            half_width_95_before: sum(|delay| delay.half_width_95_before),
+            determined: delays.iter().all(|delay| delay.determined),
+        }));
+        shown
+    }
 }
 
 /// A moving body.

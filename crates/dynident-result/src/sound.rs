@@ -1,6 +1,7 @@
 //! Plausibility of the numbers in a result.
 
-use super::identification::{BodyResult, ResultFile};
+use super::identification::ResultFile;
+use super::parameters::BodyResult;
 use dynident_model::InertialParameters;
 use dynident_model::urdf::MAX_MAGNITUDE;
 

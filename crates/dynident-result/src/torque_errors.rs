@@ -3,68 +3,11 @@
 
 use super::{FormResult, ResultFile};
 use dynident_identification::examination::LogValidation;
+use dynident_identification::rows::ParallelFilterSettings;
 use dynident_model::terms::TermClass;
-use dynident_study::{Expected, StudyError};
 
 /// Ratio of two errors below which they are listed as one.
 const MAX_EQUAL_RATIO: f64 = 1.01;
-
-/// Largest frequency of the torque in held-out errors, relative to the spectral cut-off of the motion
-/// (`method.motion_hz`).
-const MOTION_BAND_RATIO: f64 = 0.7;
-
-/// Thresholds of statements about torque errors. All errors are relative to the measured torque (root mean squares).
-#[derive(Clone, Debug, PartialEq)]
-pub struct TorqueErrorSettings {
-    /// Largest held-out error that is rated as good, percent. Default 10: real arms with a correct study have 2 to 10.
-    pub max_good_percent: f64,
-    /// Largest held-out error that is not rated as bad, percent. Default 60, like
-    /// [`ProblemSettings::max_unexplained_percent`](super::ProblemSettings).
-    pub max_fair_percent: f64,
-    /// Smallest error of a joint that is reported as much worse than the robot, percent. Default 20.
-    pub min_joint_percent: f64,
-    /// Error of a joint divided by that of all joints together, from which the joint is reported as much worse.
-    /// Default 2.
-    pub min_joint_ratio: f64,
-    /// Torque of a joint divided by the largest torque of a joint with the same unit (root mean squares), up to which
-    /// the torque is reported as small. Default 0.1.
-    pub max_small_torque_ratio: f64,
-    /// Error of an export format divided by that of the model, from which the format is reported as worse. Default 1.2.
-    pub min_form_ratio: f64,
-}
-
-impl Default for TorqueErrorSettings {
-    fn default() -> Self {
-        Self {
-            max_good_percent: 10.0,
-            max_fair_percent: 60.0,
-            min_joint_percent: 20.0,
-            min_joint_ratio: 2.0,
-            max_small_torque_ratio: 0.1,
-            min_form_ratio: 1.2,
-        }
-    }
-}
-
-impl TorqueErrorSettings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// The first setting that is not a positive number, with its value.
-    pub fn validate(&self) -> Result<(), StudyError> {
-        for (key, value) in [
-            ("max_good_percent", self.max_good_percent),
-            ("max_fair_percent", self.max_fair_percent),
-            ("min_joint_percent", self.min_joint_percent),
-            ("min_joint_ratio", self.min_joint_ratio),
-            ("max_small_torque_ratio", self.max_small_torque_ratio),
-            ("min_form_ratio", self.min_form_ratio),
-        ] {
-            Expected::Positive.check(key, value)?;
-        }
-        Ok(())
-    }
-}
 
 /// The held-out torque error of one joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,8 +50,8 @@ impl ResultFile {
 
     /// Errors of the exported model at each joint of a held-out log, the largest relative error first. Joints without
     /// torque are omitted.
-    pub fn joint_errors(&self, log: &LogValidation, settings: &TorqueErrorSettings) -> Vec<JointError> {
-        let report = log.exported();
+    pub fn joint_errors(&self, log: &LogValidation) -> Vec<JointError> {
+        let (report, settings) = (log.exported(), &self.thresholds.errors);
         let torque = |joint: usize| {
             let joint = &report.joints[joint];
             let percent = joint.relative_error_percent.filter(|percent| *percent > 0.0)?;
@@ -135,11 +78,12 @@ impl ResultFile {
 
     /// The joints with much larger held-out errors than all joints of the same log together, the worst first. Each
     /// joint is listed with its largest error.
-    pub fn weak_joints(&self, settings: &TorqueErrorSettings) -> Vec<JointError> {
+    pub fn weak_joints(&self) -> Vec<JointError> {
+        let settings = &self.thresholds.errors;
         let of_log = |log: &LogValidation| {
             let all = log.exported().relative_error_percent.unwrap_or(f64::INFINITY);
             let limit = settings.min_joint_percent.max(settings.min_joint_ratio * all);
-            let errors = self.joint_errors(log, settings).into_iter();
+            let errors = self.joint_errors(log).into_iter();
             errors.filter(|joint| joint.relative_error_percent >= limit).collect::<Vec<_>>()
         };
         let mut errors: Vec<JointError> = self.validation.iter().flat_map(of_log).collect();
@@ -156,13 +100,14 @@ impl ResultFile {
     /// Frequency below which held-out errors compare torque, Hz; `None` if the torque is not filtered.
     pub fn held_out_band_hz(&self, log: &LogValidation) -> Option<f64> {
         let summary = self.logs.iter().find(|summary| summary.log == log.log);
-        let of_motion = self.method.motion_hz.map(|motion_hz| MOTION_BAND_RATIO * motion_hz);
+        let of_motion = self.method.motion_hz.map(ParallelFilterSettings::half_gain_hz);
         of_motion.or_else(|| summary?.filter_cutoff_hz)
     }
 
     /// Held-out errors of the export formats on one log, the largest first. Formats whose errors differ by less than
     /// 1 % are combined.
-    pub fn format_errors(&self, log: &LogValidation, settings: &TorqueErrorSettings) -> Vec<FormatError> {
+    pub fn format_errors(&self, log: &LogValidation) -> Vec<FormatError> {
+        let settings = &self.thresholds.errors;
         let mut errors: Vec<FormatError> = Vec::new();
         // Without hysteresis friction, code with state equals code without state.
         let is_own = |form: &&FormResult| form.class != TermClass::WithState || form.has_memory();
@@ -198,17 +143,5 @@ impl FormResult {
             TermClass::FunctionsOfMotion => "code",
             TermClass::WithState => "function step of code",
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_are_positive() {
-        assert!(TorqueErrorSettings::default().validate().is_ok());
-        let wrong = TorqueErrorSettings { min_form_ratio: 0.0, ..TorqueErrorSettings::default() };
-        assert!(wrong.validate().unwrap_err().to_string().contains("min_form_ratio"));
     }
 }

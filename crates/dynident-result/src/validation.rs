@@ -1,6 +1,6 @@
 //! Output of `validate` as JSON.
 
-use super::identification::LogSummary;
+use super::method::LogSummary;
 use dynident_identification::examination::LogValidation;
 use serde::{Deserialize, Serialize};
 

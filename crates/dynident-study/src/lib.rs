@@ -18,6 +18,7 @@ mod log_source;
 mod overlap;
 mod payload;
 mod physical;
+mod report_thresholds;
 mod robot;
 mod robot_file;
 mod robot_model;
@@ -26,6 +27,7 @@ mod simulated;
 mod simulation;
 mod study_file;
 mod task;
+mod thresholds;
 mod torque;
 
 pub use code::{Code, FunctionChoice};
@@ -47,6 +49,7 @@ pub use log::LogSection;
 pub use log_source::StudyLogSource;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
+pub use report_thresholds::{DifferenceSettings, ProblemSettings, TorqueErrorSettings};
 pub use robot::{FollowSection, LoopSection, RobotSection};
 pub use robot_file::{LoadSettings, XacroSettings, load_robot};
 pub use robot_model::StudyRobot;
@@ -54,6 +57,7 @@ pub use servo::{FloorPointSection, FloorSection, PerJoint, ServoSection, moving_
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};
 pub use study_file::{StudyFile, relative_path};
+pub use thresholds::{ReportThresholds, ThresholdSection};
 pub use torque::TorqueSection;
 
 use dynident_identification::Role;
@@ -131,6 +135,9 @@ pub struct Study {
     /// Estimation method and error bars.
     #[serde(default)]
     pub estimator: EstimatorSection,
+    /// Thresholds of decisions, findings and statements.
+    #[serde(default, skip_serializing_if = "ThresholdSection::is_default")]
+    pub thresholds: Box<ThresholdSection>,
     /// Excitation trajectory of `design`.
     #[serde(default)]
     pub design: Option<DesignSection>,
@@ -372,6 +379,7 @@ impl Study {
             design.validate().map_err(StudyError::at("[design]"))?;
         }
         self.motion.validate().map_err(StudyError::at("[motion]"))?;
+        self.thresholds.validate()?;
         self.estimator.validate()
     }
 

@@ -1,7 +1,7 @@
 //! The robot of a study: robot description and parametric model, with locked joints, gravity and torque terms.
 
 use super::torque::declared_terms;
-use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
+use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, RobotSection, Study};
 use crate::error::{StudyError, StudyFileError};
 use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
@@ -58,6 +58,30 @@ impl Study {
     }
 }
 
+impl RobotSection {
+    /// Locked joints with their positions: those of `lock`, and those of `known` that `joints` omits, at zero.
+    fn locked_joints(&self, known: &[String]) -> Result<Vec<(String, f64)>, StudyError> {
+        let mut locked: Vec<(String, f64)> = self.lock.iter().map(|(name, at)| (name.clone(), *at)).collect();
+        let Some(joints) = &self.joints else { return Ok(locked) };
+        for (index, joint) in joints.iter().enumerate() {
+            if !known.contains(joint) {
+                return Err(ModelError::UnknownJoint { joint: joint.clone(), known: known.to_vec() }.into());
+            }
+            if joints[..index].contains(joint) {
+                let what = "robot.joints:".to_owned();
+                return Err(StudyError::Twice { what, name: joint.clone(), fix: "name it once" });
+            }
+            if self.lock.contains_key(joint) {
+                let (key, other) = ("robot.joints", "robot.lock");
+                return Err(StudyError::JointInBoth { joint: joint.clone(), key, other, state: "locked" });
+            }
+        }
+        let rest = known.iter().filter(|name| !joints.contains(name) && !self.lock.contains_key(*name));
+        locked.extend(rest.map(|name| (name.clone(), 0.0)));
+        Ok(locked)
+    }
+}
+
 impl StudyRobot {
     /// Builds the study's robot. It starts no program: [`Study::expand_robot`] must have expanded a file with xacro
     /// macros.
@@ -94,29 +118,7 @@ impl StudyRobot {
         let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let unknown =
             |joint: &str| in_study(ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() });
-        let mut locked: Vec<(String, f64)> = study.robot.lock.iter().map(|(name, at)| (name.clone(), *at)).collect();
-        if let Some(joints) = &study.robot.joints {
-            for (index, joint) in joints.iter().enumerate() {
-                if !known.contains(joint) {
-                    return Err(unknown(joint));
-                }
-                if joints[..index].contains(joint) {
-                    let (what, name) = ("robot.joints:".to_owned(), joint.clone());
-                    return Err(StudyFileError::study(study_path)(StudyError::Twice {
-                        what,
-                        name,
-                        fix: "name it once",
-                    }));
-                }
-                if study.robot.lock.contains_key(joint) {
-                    let (key, other) = ("robot.joints", "robot.lock");
-                    let both = StudyError::JointInBoth { joint: joint.clone(), key, other, state: "locked" };
-                    return Err(StudyFileError::study(study_path)(both));
-                }
-            }
-            let rest = known.iter().filter(|name| !joints.contains(name) && !study.robot.lock.contains_key(*name));
-            locked.extend(rest.map(|name| (name.clone(), 0.0)));
-        }
+        let locked = study.robot.locked_joints(&known).map_err(StudyFileError::study(study_path))?;
         model = model.locked(&locked).map_err(&in_study)?;
         if model.dof() == 0 {
             return Err(StudyFileError::study(study_path)(StudyError::missing(

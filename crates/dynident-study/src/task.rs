@@ -152,6 +152,7 @@ impl Study {
         settings.estimation.estimator = self.estimator.estimator(|| self.simulated_loop(path, robot).map(Box::new))?;
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
+        self.thresholds.apply(&mut settings);
         settings.events.choice = self.estimator.events;
         settings.friction = self.friction_searches(robot).into();
         if self.why_drives_are_untested().is_none() {

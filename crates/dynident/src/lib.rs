@@ -86,9 +86,9 @@ pub use jobs::compare::compare;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
-    EXPORT_VALIDATION_SUFFIX, ExportSettings, ServoExport, ServoTarget, export_model, export_payload,
-    export_payload_of, export_result, export_servos, export_simulator, export_simulator_of, export_stored,
-    export_validation, payload_validation, selected_payload, servo_validation, table_validation,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, ServoExport, ServoTarget, export_model, export_payload, export_result,
+    export_servos, export_simulator, export_stored, export_validation, payload_validation, selected_payload,
+    servo_validation, table_validation,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{

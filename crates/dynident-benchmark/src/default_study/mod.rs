@@ -58,6 +58,18 @@ pub fn case_figures(case: &DefaultCase, runs: Range<u64>, by_name: bool) -> Resu
     Ok(summed(&figures, (best, CUTOFF_MULTIPLES[best]), &of_best))
 }
 
+/// Mean square error of the bodies' parameters relative to the Cramér-Rao bound.
+fn square_over_bound(made: &Simulated, found: &Identification, bound: &[f64]) -> f64 {
+    let ratios = bodies(made, found).map(|(place, truth)| {
+        let own = made.regressor.layout().columns();
+        let symbol = found.model().layout().columns()[place].symbol();
+        let at = own.iter().position(|column| column.symbol() == symbol).unwrap_or(place);
+        ((found.base_values()[place] - truth) / bound[at]).powi(2)
+    });
+    let ratios: Vec<f64> = ratios.collect();
+    ratios.iter().sum::<f64>() / ratios.len() as f64
+}
+
 fn run_figures(
     case: &DefaultCase,
     robot: &CaseRobot,
@@ -72,17 +84,6 @@ fn run_figures(
     let with_truth =
         ladder.each_ref().map(|found| found.as_ref().map_or(f64::INFINITY, |found| made.free_error(found)));
     let bound = bound::bound(case, made).map_err(failed)?;
-    let over_bound = |found: &Identification| {
-        let bound = bound.as_ref()?;
-        let ratios = bodies(made, found).map(|(place, truth)| {
-            let own = made.regressor.layout().columns();
-            let symbol = found.model().layout().columns()[place].symbol();
-            let at = own.iter().position(|column| column.symbol() == symbol).unwrap_or(place);
-            ((found.base_values()[place] - truth) / bound[at]).powi(2)
-        });
-        let ratios: Vec<f64> = ratios.collect();
-        Some(ratios.iter().sum::<f64>() / ratios.len() as f64)
-    };
     let tellable = made.tellable(case, robot).map_err(failed)?;
     // Terms that cannot be selected from a log stay as at the start of a study.
     let terms_of = |joint: usize| {
@@ -123,7 +124,7 @@ fn run_figures(
         plain: plain(Estimator::Ordinary),
         plain_weighted: plain(Estimator::Weighted),
         by_name: NamedEstimator::ALL.iter().map(named).collect(),
-        square_over_bound: over_bound(&default),
+        square_over_bound: bound.map(|bound| square_over_bound(made, &default, &bound)),
         bodies: of_bodies,
         friction: of_friction.into_iter().map(|(place, truth)| covered(place, truth)).sum(),
         tellable: tellable.iter().filter(|tellable| **tellable).count(),

@@ -133,6 +133,28 @@ pub fn table_line(case: &DefaultCase, figures: &CaseFigures) -> String {
     )
 }
 
+fn verdict(reached: bool) -> &'static str {
+    if reached { "reached" } else { "MISSED" }
+}
+
+/// How many ratios are at most `most`, with median and worst.
+fn within(what: &str, ratios: &[f64], most: f64) -> String {
+    let mut sorted = ratios.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"));
+    let middle = [sorted.len().saturating_sub(1) / 2, sorted.len() / 2].map(|place| sorted.get(place));
+    let median = middle.into_iter().flatten().sum::<f64>() / 2.0;
+    let median = (!sorted.is_empty()).then_some(median);
+    let inside = ratios.iter().filter(|ratio| **ratio <= most).count();
+    format!(
+        "{what} at most {most:.2}: {inside} of {} cases, median {}, worst {}, {}",
+        ratios.len(),
+        number(median),
+        number(sorted.last().copied()),
+        verdict(inside == ratios.len())
+    )
+}
+
 /// Goals and results, one line each.
 pub fn goals(done: &[CaseFigures]) -> Vec<String> {
     let of = |ratio: fn(&CaseFigures) -> f64| -> Vec<f64> { done.iter().map(ratio).collect() };
@@ -151,23 +173,6 @@ pub fn goals(done: &[CaseFigures]) -> Vec<String> {
     };
     let held: usize = done.iter().map(|figures| figures.lag_held).sum();
     let runs: usize = done.iter().map(|figures| figures.runs).sum();
-    let verdict = |reached: bool| if reached { "reached" } else { "MISSED" };
-    let within = |what: &str, ratios: &[f64], most: f64| {
-        let mut sorted = ratios.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"));
-        let middle = [sorted.len().saturating_sub(1) / 2, sorted.len() / 2].map(|place| sorted.get(place));
-        let median = middle.into_iter().flatten().sum::<f64>() / 2.0;
-        let median = (!sorted.is_empty()).then_some(median);
-        let inside = ratios.iter().filter(|ratio| **ratio <= most).count();
-        format!(
-            "{what} at most {most:.2}: {inside} of {} cases, median {}, worst {}, {}",
-            ratios.len(),
-            number(median),
-            number(sorted.last().copied()),
-            verdict(inside == ratios.len())
-        )
-    };
     let share = |part: usize, all: usize| 100.0 * part as f64 / all.max(1) as f64;
     let is_covered = |covered: Covered| {
         covered.percent().is_none_or(|percent| (COVERAGE_PERCENT[0]..=COVERAGE_PERCENT[1]).contains(&percent))

@@ -14,7 +14,7 @@ use dynident::{
     DesignOutcome, Folders, OutputSet, RunOptions, Study, StudyRobot, check_log, check_trajectory, check_writable,
     design_study,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// File of the designed trajectory; it is not written if the trajectory was given.
 const TRAJECTORY: &str = "trajectory.csv";
@@ -97,6 +97,21 @@ fn rate(text: &str) -> Result<f64, String> {
     if (1.0..=1e4).contains(&value) { Ok(value) } else { Err("give 1 to 10000 Hz".to_owned()) }
 }
 
+/// Writes the files of a design, and removes those of an earlier one.
+fn write_files(out: &Path, outcome: &DesignOutcome, files: &[(&str, Vec<u8>)]) -> Result<(), String> {
+    let mut set = OutputSet::new(out).file("design.json", pretty_json(&outcome.file)?);
+    for (name, contents) in files {
+        set = set.file(name, contents.as_slice());
+    }
+    let is_checked = outcome.file.given.is_some();
+    let others =
+        OPTIONAL_FILES.iter().chain(&LEROBOT_FILES).filter(|name| !files.iter().any(|(written, _)| written == *name));
+    for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
+        set = set.absent(name);
+    }
+    set.write().map_err(message_of)
+}
+
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     if study.drive.servo.is_some() {
@@ -107,8 +122,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             CommandForms { ros2: options.to.contains(&Format::Ros2), lerobot: options.to.contains(&Format::Lerobot) };
         return design_commands(
             &mut study,
-            (&options.study, &options.out),
-            (options.data.as_deref(), options.seed),
+            &options.study,
+            &options.out,
+            options.data.as_deref(),
+            options.seed,
             forms,
             context,
         );
@@ -125,8 +142,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         &["robot", "torque", "design"]
     };
     let further: Vec<PathBuf> = options.check.iter().cloned().collect();
-    let of_study = (&study, &*options.study, options.data.as_deref());
-    refuse_overwriting((&options.out, &names), of_study, sections, &further)?;
+    let (path, data) = (&options.study, options.data.as_deref());
+    refuse_overwriting(&options.out, &names, &study, path, data, sections, &further)?;
     check_writable(&options.out).map_err(message_of)?;
     writable_formats(options, &study)?;
     let progress = context.progress();
@@ -145,18 +162,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark("search stopped: this is the best motion found");
     }
     let files = files(&outcome, &study, options, context)?;
-    let mut set = OutputSet::new(&options.out).file("design.json", pretty_json(&outcome.file)?);
-    for (name, contents) in &files {
-        set = set.file(name, contents.as_slice());
-    }
-    // Remove files of an earlier design.
-    let is_checked = outcome.file.given.is_some();
-    let others =
-        OPTIONAL_FILES.iter().chain(&LEROBOT_FILES).filter(|name| !files.iter().any(|(written, _)| written == *name));
-    for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
-        set = set.absent(name);
-    }
-    set.write().map_err(message_of)?;
+    write_files(&options.out, &outcome, &files)?;
     if !outcome.file.feasible && !options.to.is_empty() {
         terminal::remark("no robot file was written: the motion breaks its limits");
     }
@@ -221,8 +227,8 @@ fn files(
             Format::Lerobot => {
                 let (_, motion) = outcome.sampled(rate_hz);
                 let positions: Vec<Vec<f64>> = motion.q.chunks(motion.samples).map(<[f64]>::to_vec).collect();
-                let of_study = (study, &*options.study);
-                files.extend(lerobot_files(of_study, &outcome.robot, (&file.name[..], rate_hz), &positions, context)?);
+                let (path, name) = (&options.study, &file.name[..]);
+                files.extend(lerobot_files(study, path, &outcome.robot, name, rate_hz, &positions, context)?);
             }
             Format::Urscript => {
                 let mut settings = UrScriptSettings::default();

@@ -24,8 +24,10 @@ pub(super) struct CommandForms {
 /// logs, and `seed` replaces that of the study. Files in `forms` are written if the motion keeps all limits.
 pub(super) fn design_commands(
     study: &mut Study,
-    (path, out): (&Path, &Path),
-    (data, seed): (Option<&Path>, Option<u64>),
+    path: &Path,
+    out: &Path,
+    data: Option<&Path>,
+    seed: Option<u64>,
     forms: CommandForms,
     context: &Context,
 ) -> Result<Verdict, String> {
@@ -33,7 +35,7 @@ pub(super) fn design_commands(
         servo.design.seed = seed;
     }
     let names: Vec<&str> = [DESIGN, COMMANDS, ROS2].into_iter().chain(LEROBOT_FILES).collect();
-    refuse_overwriting((out, &names), (&*study, path, data), &["robot", "design", "log", "format"], &[])?;
+    refuse_overwriting(out, &names, study, path, data, &["robot", "design", "log", "format"], &[])?;
     check_writable(out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: data.map(Path::to_owned), threads: context.threads, progress: &*progress };
@@ -77,17 +79,19 @@ fn files(
         files.push((ROS2, text.into_bytes()));
     }
     if forms.lerobot && file.feasible {
-        let episode = (&file.study[..], file.rate_hz);
-        files.extend(lerobot_files((study, path), &outcome.robot, episode, &outcome.commands, context)?);
+        let (name, commands) = (&file.study[..], &outcome.commands);
+        files.extend(lerobot_files(study, path, &outcome.robot, name, file.rate_hz, commands, context)?);
     }
     Ok(files)
 }
 
 /// The LeRobot data set with the joint positions of a design with this name, at this rate.
 pub(super) fn lerobot_files(
-    (study, path): (&Study, &Path),
+    study: &Study,
+    path: &Path,
     robot: &StudyRobot,
-    (name, rate_hz): (&str, f64),
+    name: &str,
+    rate_hz: f64,
     positions: &[Vec<f64>],
     context: &Context,
 ) -> Result<EpisodeFiles, String> {

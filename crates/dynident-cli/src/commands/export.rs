@@ -5,9 +5,9 @@ use clap::ValueEnum;
 use dynident::export::{CodeOptions, ControllerBrand, Exported, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile, ExportValidationFile, ServoFile, ServoForm};
 use dynident::{
-    EXPORT_VALIDATION_SUFFIX, ExportSettings, OutputSet, ResultFile, ServoTarget, Study, export_payload_of,
-    export_result, export_servos, export_simulator_of, export_stored, export_validation, payload_validation,
-    selected_payload, servo_validation, study_inputs,
+    EXPORT_VALIDATION_SUFFIX, ExportSettings, OutputSet, ResultFile, ServoTarget, Study, export_payload, export_result,
+    export_servos, export_simulator, export_stored, export_validation, payload_validation, selected_payload,
+    servo_validation, study_inputs,
 };
 use std::path::{Path, PathBuf};
 
@@ -164,13 +164,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let code = CodeOptions { float32: options.float32, regressor: options.regressor, step_width: options.step_width };
     if let Some(file) = ServoFile::read(&result).map_err(message_of)? {
         let study = study.as_ref().map(|(study, path)| (study, *path));
-        return drives(&file, &result, study, (options, code), context);
+        return drives(&file, &result, study, options, code, context);
     }
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
     let stored = read(&result).map_err(message_of)?;
     let simulator = || -> Result<_, String> {
         let (study, path) = with_study()?;
-        export_simulator_of(&stored, &result, study, path, data).map_err(known_in(path))
+        export_simulator(&stored, &result, study, path, data).map_err(known_in(path))
     };
     if !matches!(options.to.kind(), Kind::Model(_)) && code != CodeOptions::default() {
         return Err("--float32, --regressor and --step-width are options of code: omit them".to_owned());
@@ -188,7 +188,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         Kind::SimulatorJson => simulator()?.json().map_err(|error| error.to_string())?,
         Kind::SimulatorTable => simulator()?.table(),
         Kind::Payload(reader) => {
-            export_payload_of(&stored, &result, options.payload.as_deref(), reader).map_err(message_of)?
+            export_payload(&stored, &result, options.payload.as_deref(), reader).map_err(message_of)?
         }
         Kind::Drives => {
             return Err(format!(
@@ -215,7 +215,8 @@ fn drives(
     file: &ServoFile,
     result: &Path,
     study: Option<(&Study, &Path)>,
-    (options, code): (&Options, CodeOptions),
+    options: &Options,
+    code: CodeOptions,
     context: &Context,
 ) -> Result<Verdict, String> {
     let form = options.to.name();

@@ -67,7 +67,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(path) = &options.study {
         let study = options.programs.load_study(path, options.data.as_deref())?;
         if study.fits_commands() {
-            return servos(&study, path, &out, options, (context, &run));
+            return servos(&study, path, &out, options, context, &run);
         }
     }
     let mut identification = match &options.study {
@@ -130,13 +130,13 @@ fn servos(
     path: &Path,
     out: &Path,
     options: &Options,
-    (context, run): (&Context, &RunOptions<'_>),
+    context: &Context,
+    run: &RunOptions<'_>,
 ) -> Result<Verdict, String> {
     if options.max_validation_error.is_some() {
         return Err("--max-validation-error judges torque, and this study has commands: remove it".to_owned());
     }
-    let named = (study, path, options.data.as_deref());
-    refuse_overwriting((out, &FILES), named, &["robot", "log", "format"], &[])?;
+    refuse_overwriting(out, &FILES, study, path, options.data.as_deref(), &["robot", "log", "format"], &[])?;
     check_writable(out).map_err(message_of)?;
     let mut found = identify_servos(study, path, run).map_err(known_in(path))?;
     if let Some(provenance) = &mut found.result.provenance {
@@ -167,9 +167,8 @@ fn servos(
 
 fn of_study(path: &Path, out: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
     let study = options.programs.load_study(path, options.data.as_deref())?;
-    let named = (&study, path, options.data.as_deref());
     let sections = ["robot", "torque", "log", "arm", "format", "motion", "estimator"];
-    refuse_overwriting((out, &FILES), named, &sections, &[])?;
+    refuse_overwriting(out, &FILES, &study, path, options.data.as_deref(), &sections, &[])?;
     check_writable(out).map_err(message_of)?;
     identify(&study, path, run).map_err(known_in(path))
 }

@@ -82,9 +82,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let names = written_files(&study);
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let of_study = (&study, &*options.study, options.data.as_deref());
     let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
-    refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
+    let data = options.data.as_deref();
+    refuse_overwriting(&options.out, &names, &study, &options.study, data, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let decisions = options.programs.decisions();
     decisions.decide_on_robot(&study, &options.study)?;

@@ -145,8 +145,11 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
 /// Checks that none of the files (or folders) `names` in the folder `out` is an input of the study in `sections`, or
 /// one of `further`.
 pub(crate) fn refuse_overwriting(
-    (out, names): (&Path, &[&str]),
-    (study, path, data): (&Study, &Path, Option<&Path>),
+    out: &Path,
+    names: &[&str],
+    study: &Study,
+    path: &Path,
+    data: Option<&Path>,
     sections: &[&str],
     further: &[PathBuf],
 ) -> Result<(), String> {

@@ -93,12 +93,12 @@ fn figure(options: &Options, input: &Path, context: &Context) -> Result<Figure, 
     let stored = ResultFile::read(input).map_err(message_of)?;
     match options.figure {
         Kind::Friction => Figure::friction(&stored, input).map_err(message_of),
-        Kind::Residuals => residuals(options, (&stored, input), context),
+        Kind::Residuals => residuals(options, &stored, input, context),
         Kind::Parameters | Kind::Convergence => Ok(Figure::parameters(&stored)),
     }
 }
 
-fn residuals(options: &Options, (stored, input): (&ResultFile, &Path), context: &Context) -> Result<Figure, String> {
+fn residuals(options: &Options, stored: &ResultFile, input: &Path, context: &Context) -> Result<Figure, String> {
     let Some(path) = &options.study else {
         return Err(format!(
             "{}: a result contains no samples, which residuals need: give the study with its logs (--study STUDY.toml)",

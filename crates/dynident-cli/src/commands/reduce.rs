@@ -43,8 +43,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     let (folder, name) = place(&options.out)?;
     let further: Vec<PathBuf> = options.like.iter().cloned().collect();
-    let of_study = (&study, &*options.study, options.data.as_deref());
-    refuse_overwriting((folder, &[name]), of_study, &["robot", "torque", "log", "format", "motion"], &further)?;
+    let (path, data) = (&options.study, options.data.as_deref());
+    let sections = ["robot", "torque", "log", "format", "motion"];
+    refuse_overwriting(folder, &[name], &study, path, data, &sections, &further)?;
     if !options.logs.is_empty() {
         choose(&mut study, &options.logs).map_err(|why| format!("{}: {why}", options.study.display()))?;
     }

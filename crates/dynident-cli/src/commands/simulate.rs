@@ -27,9 +27,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    let of_study = (&study, &*options.study, options.data.as_deref());
+    let (path, data) = (&options.study, options.data.as_deref());
     let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
-    refuse_overwriting((&options.out, &["log.csv", "truth.json"]), of_study, &sections, &[])?;
+    refuse_overwriting(&options.out, &["log.csv", "truth.json"], &study, path, data, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };

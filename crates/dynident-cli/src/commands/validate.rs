@@ -39,14 +39,14 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let result = result_file(&options.result);
     let stored = read(&result).map_err(message_of)?;
     if let Some(folder) = &options.samples {
-        write_samples(folder, options, (&study, &result, &stored), &run)?;
+        write_samples(folder, options, &study, &result, &stored, &run)?;
     }
     let file = validate_result(&stored, &result, &study, &options.study, &run);
     let file = file.map_err(known_in(&options.study))?;
     if context.json {
         terminal::print_document(&json(&file)?)?;
     } else {
-        terminal::print(&summary::validation(&file.validation, &file.logs))?;
+        terminal::print(&summary::validation(&file.validation, &file.logs, &stored.thresholds.errors))?;
     }
     show_problems(&file.problems, "");
     let within = judged(&file.validation, options.max_validation_error);
@@ -56,7 +56,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 fn write_samples(
     folder: &Path,
     options: &Options,
-    (study, result, stored): (&Study, &Path, &ResultFile),
+    study: &Study,
+    result: &Path,
+    stored: &ResultFile,
     run: &RunOptions<'_>,
 ) -> Result<(), String> {
     let (description, tables) =

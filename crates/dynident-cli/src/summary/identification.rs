@@ -7,7 +7,7 @@ use dynident::ResultFile;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::{LagKind, LogValidation};
 use dynident::identification::friction::FrictionCandidate;
-use dynident::result::{BaseParameterResult, LogSummary, POORLY_KNOWN_PERCENT, TorqueErrorSettings};
+use dynident::result::{BaseParameterResult, LogSummary, POORLY_KNOWN_PERCENT};
 use std::path::Path;
 
 /// Maximum number of base parameters shown; the file contains all.
@@ -42,7 +42,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text += &noise(r);
     text += &joints(r);
     for log in &r.validation {
-        text += &residuals(log);
+        text += &residuals(log, &r.thresholds.errors);
     }
     text += &lags(r);
     text += &between_logs(r);
@@ -148,7 +148,7 @@ fn without_events(log: &LogValidation) -> String {
 
 /// The joints with much larger errors than all joints together.
 fn weak_joints(r: &ResultFile) -> String {
-    let weak = r.weak_joints(&TorqueErrorSettings::default());
+    let weak = r.weak_joints();
     if weak.is_empty() {
         return String::new();
     }

@@ -32,7 +32,8 @@ pub(crate) fn servo(file: &ServoFile, out: &Path, models: &[&str]) -> String {
     let header: Vec<String> =
         core::iter::once("joint".to_owned()).chain(SHOWN.iter().map(|(_, column)| (*column).to_owned())).collect();
     let rows = file.joints.iter().zip(&file.drives).map(|(joint, drive)| {
-        let value = |name: &str| drive.values.iter().find(|value| value.name == name);
+        let values = drive.shown_values();
+        let value = |name: &str| values.iter().find(|value| value.name == name);
         let cells = SHOWN.iter().map(|(name, _)| value(name).map_or_else(String::new, estimate));
         core::iter::once(joint.clone()).chain(cells).collect()
     });

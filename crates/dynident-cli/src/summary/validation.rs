@@ -2,12 +2,12 @@ use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
 use dynident::estimation::ValidationReport;
 use dynident::identification::examination::{JointResiduals, LogValidation};
-use dynident::result::LogSummary;
+use dynident::result::{LogSummary, TorqueErrorSettings};
 
 /// Significance level of the residual tests.
 const SIGNIFICANCE: f64 = 0.01;
 
-pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
+pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary], settings: &TorqueErrorSettings) -> String {
     let mut text = String::new();
     for log in logs {
         let free = match log.physical {
@@ -26,20 +26,15 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
         rows.push(row(log, None));
         let header = ["joint", "error %", "rms Nm", "max Nm", "R2", "free, raw %", "prior %"].map(str::to_owned);
         text += &table(&header, 1..7, rows);
-        text += &residuals(log);
+        text += &residuals(log, settings);
         text.push('\n');
     }
     text += &findings(summaries);
     text
 }
 
-/// Ratio of the residuals at reversals to those of fast motion from which a likely cause is named. In 128 simulated
-/// studies with the right friction law (`benchmarks/changes.py`) the ratio was 0.5 to 1.5, in one with joints that
-/// stick at each reversal 2.2.
-const LARGE_REVERSAL_RATIO: f64 = 2.0;
-
 /// The properties of a held-out log's residuals in one line.
-pub(super) fn residuals(log: &LogValidation) -> String {
+pub(super) fn residuals(log: &LogValidation, settings: &TorqueErrorSettings) -> String {
     let count = |of: &dyn Fn(&JointResiduals) -> bool| log.residuals.iter().filter(|joint| of(joint)).count();
     let all = log.residuals.len();
     let coloured = count(&|joint| joint.whiteness.is_some_and(|test| test.p_value < SIGNIFICANCE));
@@ -55,7 +50,7 @@ pub(super) fn residuals(log: &LogValidation) -> String {
         String::new()
     } else {
         let ratio = mean(&ratios);
-        let cause = if ratio >= LARGE_REVERSAL_RATIO { " (usually friction near standstill)" } else { "" };
+        let cause = if ratio >= settings.min_reversal_ratio { " (usually friction near standstill)" } else { "" };
         format!(", at reversals {ratio:.2} times those of fast motion{cause}")
     };
     let covered: Vec<f64> =

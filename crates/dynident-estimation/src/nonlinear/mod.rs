@@ -8,6 +8,7 @@
 mod autoregression;
 mod simulated;
 mod simultaneous;
+mod simultaneous_problem;
 mod simultaneous_rows;
 mod spline_motion;
 
@@ -15,9 +16,9 @@ pub use simulated::{
     SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
     simulated_least_squares,
 };
-pub use simultaneous::{
+pub use simultaneous::{simultaneous_bound, simultaneous_least_squares};
+pub use simultaneous_problem::{
     ChannelNoise, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
-    simultaneous_bound, simultaneous_least_squares,
 };
 pub use simultaneous_rows::ChannelRows;
 pub use spline_motion::{

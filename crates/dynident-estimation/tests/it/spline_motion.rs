@@ -90,8 +90,11 @@ fn truth(joints: usize) -> Vec<f64> {
 /// noise.
 fn record(
     joints: usize,
-    (rate_hz, samples): (f64, usize),
-    (position, torque, colour): (f64, f64, f64),
+    rate_hz: f64,
+    samples: usize,
+    position: f64,
+    torque: f64,
+    colour: f64,
     random: &mut Random,
 ) -> SplineRecord {
     let (mut q, mut dq, mut ddq) = (Vec::new(), Vec::new(), Vec::new());
@@ -141,7 +144,7 @@ fn errors_agree_with_their_error_bars() {
         let (mut squares, mut count) = (0.0, 0);
         for seed in 0..dynident_testing::count(6, 60) as u64 {
             let mut random = Random::new(100 + seed);
-            let log = record(2, (200.0, 2000), (5e-4, 0.05, colour), &mut random);
+            let log = record(2, 200.0, 2000, 5e-4, 0.05, colour, &mut random);
             let found = fitted(2, vec![log], &white());
             assert_eq!(
                 found.estimate.status,
@@ -166,7 +169,7 @@ fn errors_agree_with_their_error_bars() {
 #[test]
 fn pieces_have_separate_motions() {
     let mut random = Random::new(7);
-    let whole = record(1, (200.0, 2000), (5e-4, 0.05, 0.0), &mut random);
+    let whole = record(1, 200.0, 2000, 5e-4, 0.05, 0.0, &mut random);
     let part = |run: core::ops::Range<usize>| SplineRecord {
         q: whole.q[run.clone()].to_vec(),
         tau: whole.tau[run].to_vec(),
@@ -196,7 +199,7 @@ fn pieces_have_separate_motions() {
 fn threads_do_not_change_the_estimate() {
     let made = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let log = record(2, (200.0, 600), (5e-4, 0.05, 0.0), &mut Random::new(9));
+        let log = record(2, 200.0, 600, 5e-4, 0.05, 0.0, &mut Random::new(9));
         pool.install(|| fitted(2, vec![log], &white())).estimate
     };
     assert_eq!(made(1), made(3));
@@ -204,7 +207,7 @@ fn threads_do_not_change_the_estimate() {
 
 #[test]
 fn wrong_input_is_an_error() {
-    let good = record(1, (200.0, 200), (5e-4, 0.05, 0.0), &mut Random::new(1));
+    let good = record(1, 200.0, 200, 5e-4, 0.05, 0.0, &mut Random::new(1));
     let names: Vec<String> = (0..5).map(|k| format!("p{k}")).collect();
     let joints = vec!["joint".to_owned()];
     let begun = |record: SplineRecord| SplineMotionProblem {

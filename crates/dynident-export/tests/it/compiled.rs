@@ -21,7 +21,7 @@ fn robots() -> Vec<RobotModel> {
 }
 
 /// Compiles `program` next to the file `name` with `text`, or shows the compiler's messages.
-fn compiled(folder: &Path, (name, text): (&str, &str), (main, program): (&str, &str), compiler: &[&str]) -> Command {
+fn compiled(folder: &Path, name: &str, text: &str, main: &str, program: &str, compiler: &[&str]) -> Command {
     std::fs::write(folder.join(name), text).unwrap();
     std::fs::write(folder.join(main), program).unwrap();
     let output =
@@ -97,7 +97,7 @@ fn cpp_computes_what_the_core_computes() {
         let folder = tempfile::tempdir().unwrap();
         let text = export(&robot, Target::Cpp, &[]).unwrap().text;
         let compiler = ["c++", "-std=c++17", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1"];
-        let mut program = compiled(folder.path(), ("robot.hpp", &text), ("main.cpp", &program), &compiler);
+        let mut program = compiled(folder.path(), "robot.hpp", &text, "main.cpp", &program, &compiler);
         compare(&mut program, &robot, &expected(&robot));
     }
 }
@@ -133,7 +133,7 @@ fn rust_computes_what_the_core_computes() {
         let folder = tempfile::tempdir().unwrap();
         let text = export(&robot, Target::Rust, &[]).unwrap().text;
         let compiler = [rustc.as_str(), "--edition", "2021", "-O", "-D", "warnings"];
-        let mut run = compiled(folder.path(), ("robot.rs", &text), ("main.rs", &program), &compiler);
+        let mut run = compiled(folder.path(), "robot.rs", &text, "main.rs", &program, &compiler);
         compare(&mut run, &robot, &expected(&robot));
         // The module also compiles alone, as a library without the standard library.
         std::fs::write(folder.path().join("alone.rs"), format!("#![no_std]\n{text}")).unwrap();

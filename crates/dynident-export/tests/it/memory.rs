@@ -232,10 +232,10 @@ fn check(compiler: &[&str], files: [(&str, &str); 2], last: &[&str], log: &Log, 
         .unwrap();
     assert!(output.status.success(), "{compiler:?}: {}", String::from_utf8_lossy(&output.stderr));
     std::fs::write(at.join("log"), log.lines()).unwrap();
-    compare(Command::new(at.join("program")), &at.join("log"), log, (compiler, tolerance));
+    compare(Command::new(at.join("program")), &at.join("log"), log, compiler, tolerance);
 }
 
-fn compare(mut program: Command, input: &Path, log: &Log, (compiler, tolerance): (&[&str], f64)) {
+fn compare(mut program: Command, input: &Path, log: &Log, compiler: &[&str], tolerance: f64) {
     let output = program.stdin(std::fs::File::open(input).unwrap()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
@@ -317,5 +317,5 @@ fn octave_follows_the_memory() {
     std::fs::write(folder.path().join("log"), log.lines()).unwrap();
     let mut octave = Command::new("octave-cli");
     octave.args(["--quiet", "--no-init-file", "run_log.m"]).current_dir(folder.path());
-    compare(octave, &folder.path().join("log"), &log, (&["octave-cli"], TOLERANCE));
+    compare(octave, &folder.path().join("log"), &log, &["octave-cli"], TOLERANCE);
 }

@@ -7,7 +7,7 @@ use dynident_estimation::{HALF_WIDTH_95, normal_below};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Probability below which an explanation is omitted from the average.
-const MIN_PROBABILITY: f64 = 1e-3;
+const MIN_AVERAGED_PROBABILITY: f64 = 1e-3;
 
 /// Number of bisections of the interval that contains a half-width. The error is then below 1e-9 of its upper limit.
 const HALVINGS: usize = 30;
@@ -72,7 +72,7 @@ impl Differences {
         let written = DVector::from_fn(count, |k, _| written[k] - nominal[k]);
         let (mut sum, mut total) = (DMatrix::zeros(count, count), 0.0);
         let mut normals = Vec::new();
-        for own in self.explanations.iter().filter(|own| own.probability >= MIN_PROBABILITY) {
+        for own in self.explanations.iter().filter(|own| own.probability >= MIN_AVERAGED_PROBABILITY) {
             let (mean, covariance) = self.posterior(own)?;
             let gap = &written - mean;
             let std = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());

@@ -9,37 +9,6 @@ use dynident_estimation::EstimationError;
 use dynident_estimation::changes::{ChangeGroup, ChangeSettings, Explanation, explanations};
 use nalgebra::{DMatrix, DVector};
 
-/// Prior probability of all small differences from a description, and of all large ones: neither few nor all bodies are
-/// preferred.
-const SMALL_PROBABILITY: f64 = 0.5;
-
-/// Prior probability of small differences of all bodies between two estimates, and of large ones. Two estimates usually
-/// belong to the same robot, whose bodies did not all change.
-const OTHER_ROBOT_PROBABILITY: f64 = 0.05;
-
-/// Expected value of the common factor of a changed body, minus 1.
-const EXPECTED_FACTOR: f64 = 0.5;
-
-/// Expected common factor with a load, relative to that without: most of a load near the centre of mass of its body is
-/// a factor, and the rest is small.
-const FACTOR_WITH_LOAD: f64 = 5.0;
-
-/// Prior probability of a change of terms, and of each way in which a body changes: a load, a common factor of all its
-/// values, or both.
-const CHANGE_PROBABILITY: f64 = 0.025;
-
-/// Factors of the error bars of a difference from a description, with the same probability: error bars for correlated
-/// residuals can be twice too wide.
-const ERROR_FACTORS: [f64; 3] = [0.5, 1.0, 2.0];
-
-/// Expected difference of a friction or drive parameter relative to its value. It is large because robot descriptions
-/// do not contain the friction of the real drive.
-const UNKNOWN_TERM_RATIO: f64 = 50.0;
-
-/// Among explanations with the same changed bodies, smaller differences of the other bodies are preferred if their
-/// probability is at least this share of the largest one, because descriptions are usually right.
-const MIN_SHARE_OF_LARGEST: f64 = 0.1;
-
 /// Explanations of the difference between an estimate and the description of its robot, or between two estimates.
 #[derive(Clone, Debug)]
 pub struct Differences {
@@ -77,6 +46,7 @@ impl Differences {
         values: &DVector<f64>,
         covariance: &DMatrix<f64>,
         knowledge: &ConsistencySettings,
+        limits: &DescriptionThresholds,
     ) -> Result<Option<Self>, EstimationError> {
         let base = robot.base();
         let is_stated = knowledge.bodies.values().any(|own| own.prior.is_some() || own.known.is_some());
@@ -91,13 +61,13 @@ impl Differences {
         let mut covariance = bars.clone();
         for column in inertial..inertial + robot.terms().len() {
             let place = rows.iter().position(|&row| base.independent()[row] == column);
-            let effect = all.column(column) * (UNKNOWN_TERM_RATIO * place.map_or(1.0, |k| absolute[k]));
+            let effect = all.column(column) * (limits.unknown_term_ratio * place.map_or(1.0, |k| absolute[k]));
             covariance += &effect * effect.transpose();
         }
         let sizes = SPREADS.to_vec();
         let effects = all.columns(0, inertial).into_owned();
         let all = parts(robot.model(), base, rows, &absolute);
-        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Description);
+        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Description, limits);
         let mut found = Self {
             explanations: Vec::new(),
             parts,
@@ -110,11 +80,12 @@ impl Differences {
         };
         // Only the error bars have a factor: friction is unknown, and differences of bodies have their own sizes.
         let pair_ratios = vec![1.0, 1.0 / 3.0, 3.0];
-        let settings = ChangeSettings { error_factors: vec![1.0], pair_ratios, ..settings() };
-        found.explain(&groups, bars, &ERROR_FACTORS, &settings)?;
+        let settings = ChangeSettings { error_factors: vec![1.0], pair_ratios, ..settings(limits) };
+        found.explain(&groups, bars, &limits.error_factors, &settings)?;
         let probability = |own: &Spread| {
-            let of_all = if own.is_small() { SMALL_PROBABILITY } else { 1.0 - SMALL_PROBABILITY };
-            of_all * own.share()
+            let small = limits.small_probability;
+            let of_all = if own.is_small(limits.max_small_share) { small } else { 1.0 - small };
+            of_all * own.share(limits.max_small_share)
         };
         found.reweight(&found.of_sizes(probability));
         found.exclude_negative_masses(robot.nominal());
@@ -131,6 +102,7 @@ impl Differences {
         robot: &ParametricModel,
         rows: &[usize],
         [(old, old_covariance), (new, new_covariance)]: [(&DVector<f64>, &DMatrix<f64>); 2],
+        limits: &DescriptionThresholds,
     ) -> Result<Self, EstimationError> {
         let inertial = robot.model().inertial_count();
         let mut sizes = vec![Spread { shape: 0.0, scale: 0.0 }];
@@ -143,7 +115,7 @@ impl Differences {
         let larger: Vec<f64> = first.iter().zip(&second).map(|(first, second)| first.max(*second)).collect();
         let effects = effects(robot.base()).select_rows(rows).columns(0, inertial).into_owned();
         let all = parts(robot.model(), robot.base(), rows, &larger);
-        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Estimate);
+        let (parts, unknowns, groups) = groups(robot, all, &effects, Reference::Estimate, limits);
         let mut found = Self {
             explanations: Vec::new(),
             parts,
@@ -154,12 +126,12 @@ impl Differences {
             sizes,
             spreads,
         };
-        found.explain(&groups, &DMatrix::zeros(rows.len(), rows.len()), &[1.0], &settings())?;
+        found.explain(&groups, &DMatrix::zeros(rows.len(), rows.len()), &[1.0], &settings(limits))?;
         let probability = |own: &Spread| {
             if own.largest() > 0.0 {
-                OTHER_ROBOT_PROBABILITY * own.share()
+                limits.other_robot_probability * own.share(limits.max_small_share)
             } else {
-                1.0 - 2.0 * OTHER_ROBOT_PROBABILITY
+                1.0 - 2.0 * limits.other_robot_probability
             }
         };
         found.reweight(&found.of_sizes(probability));
@@ -269,7 +241,7 @@ impl Differences {
             };
             *total += own.probability;
             let is_smaller = self.sizes[own.covariance].largest() < self.sizes[chosen.covariance].largest();
-            if is_smaller && own.probability >= MIN_SHARE_OF_LARGEST * *largest {
+            if is_smaller && own.probability >= limits.min_share_of_largest * *largest {
                 *chosen = own;
             }
         }
@@ -318,6 +290,7 @@ fn groups(
     all: Parts,
     effects: &DMatrix<f64>,
     reference: Reference,
+    limits: &DescriptionThresholds,
 ) -> (Vec<Part>, Vec<DMatrix<f64>>, Vec<ChangeGroup>) {
     let (mut parts, mut unknowns, mut groups) = (Vec::new(), Vec::new(), Vec::new());
     for ((part, group), sizes) in all.parts.into_iter().zip(all.groups).zip(all.sizes) {
@@ -327,9 +300,9 @@ fn groups(
         }
         let own = DMatrix::from_diagonal(&sizes);
         if let Some(body) = part.body() {
-            let factor = nominal_values(robot, body) * EXPECTED_FACTOR;
+            let factor = nominal_values(robot, body) * limits.expected_factor;
             let mut both = own.clone().insert_column(sizes.len(), 0.0);
-            both.set_column(sizes.len(), &(&factor * FACTOR_WITH_LOAD));
+            both.set_column(sizes.len(), &(&factor * limits.factor_with_load));
             let factor = DMatrix::from_column_slice(factor.len(), 1, factor.as_slice());
             for unknown in [Some(factor), is_description.then_some(both)].into_iter().flatten() {
                 parts.push(part.clone());
@@ -346,8 +319,8 @@ fn groups(
 }
 
 /// Settings without a change of all groups together, which the differences of all bodies replace.
-fn settings() -> ChangeSettings {
-    ChangeSettings { together: false, probability: CHANGE_PROBABILITY, ..ChangeSettings::default() }
+fn settings(limits: &DescriptionThresholds) -> ChangeSettings {
+    ChangeSettings { together: false, probability: limits.change_probability, ..ChangeSettings::default() }
 }
 
 /// Absolute values with their standard deviations.

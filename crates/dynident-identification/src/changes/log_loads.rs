@@ -2,16 +2,11 @@
 
 use super::parts::{Part, parts};
 use crate::between_logs::{fit_alone, fit_without};
+use crate::thresholds::LogLoadThresholds;
 use crate::training::Training;
 use dynident_estimation::changes::{ChangeSettings, explanations};
 use dynident_estimation::{Estimate, EstimationError, WeightedSettings, weighted_least_squares};
 use nalgebra::{DMatrix, DVector};
-
-/// Minimum probability of all explanations that contain the body, for a load to be reported.
-const MIN_PROBABILITY: f64 = 0.95;
-
-/// Minimum mass of a load divided by its standard deviation, for the load to be reported.
-const MIN_DEVIATIONS: f64 = 5.0;
 
 /// A load that one training log carries and the other training logs do not.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +31,11 @@ pub struct LogLoad {
 ///
 /// # Errors
 /// As [`weighted_least_squares`] and [`explanations`].
-pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Result<Vec<LogLoad>, EstimationError> {
+pub(crate) fn log_loads(
+    training: &Training,
+    settings: &WeightedSettings,
+    limits: &LogLoadThresholds,
+) -> Result<Vec<LogLoad>, EstimationError> {
     let problem = &training.problem;
     let logs: Vec<usize> = training
         .logs
@@ -56,7 +55,7 @@ pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Res
         let fits = fit_alone(problem, log, settings, &all)
             .and_then(|own| Ok((own, fit_without(problem, log, settings, &all)?)));
         let Ok((own, others)) = fits else { continue };
-        let Some(mut load) = load_between(training, &own, &others)? else { continue };
+        let Some(mut load) = load_between(training, &own, &others, limits)? else { continue };
         load.log = logs[log];
         if load.mass_kg < 0.0 {
             if logs.len() > 2 {
@@ -71,7 +70,12 @@ pub(crate) fn log_loads(training: &Training, settings: &WeightedSettings) -> Res
 
 /// The load that explains the difference between the fits `own` and `others`; its mass is negative if the other logs
 /// carry the load.
-fn load_between(training: &Training, own: &Estimate, others: &Estimate) -> Result<Option<LogLoad>, EstimationError> {
+fn load_between(
+    training: &Training,
+    own: &Estimate,
+    others: &Estimate,
+    limits: &LogLoadThresholds,
+) -> Result<Option<LogLoad>, EstimationError> {
     let robot = &training.model.parametric;
     let base = robot.base();
     let is_fixed = |fit: &Estimate, row: usize| fit.rank.fixed.iter().any(|fixed| fixed.column == row);
@@ -102,7 +106,8 @@ fn load_between(training: &Training, own: &Estimate, others: &Estimate) -> Resul
             probability,
         })
     });
-    let is_clear =
-        |load: &LogLoad| load.probability >= MIN_PROBABILITY && load.mass_kg.abs() >= MIN_DEVIATIONS * load.mass_std_kg;
+    let is_clear = |load: &LogLoad| {
+        load.probability >= limits.min_probability && load.mass_kg.abs() >= limits.min_deviations * load.mass_std_kg
+    };
     Ok(loads.find(is_clear))
 }

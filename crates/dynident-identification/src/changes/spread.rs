@@ -20,15 +20,17 @@ impl Spread {
         self.shape.max(self.scale)
     }
 
-    /// Whether this is a small difference of all bodies.
-    pub(super) fn is_small(self) -> bool {
-        self.largest() <= SMALL
+    /// Whether this is a small difference of all bodies
+    /// ([`max_small_share`](crate::DescriptionThresholds::max_small_share)).
+    pub(super) fn is_small(self, max_small_share: f64) -> bool {
+        self.largest() <= max_small_share
     }
 
     /// Share of this size in the prior probability of all small (or all large) sizes in [`SPREADS`]; these have equal
     /// shares.
-    pub(super) fn share(self) -> f64 {
-        1.0 / SPREADS.iter().filter(|own| own.is_small() == self.is_small()).count() as f64
+    pub(super) fn share(self, max_small_share: f64) -> f64 {
+        let is_small = |own: &Self| own.is_small(max_small_share);
+        1.0 / SPREADS.iter().filter(|own| is_small(own) == is_small(&self)).count() as f64
     }
 }
 
@@ -61,9 +63,6 @@ pub const SPREADS: [Spread; 22] = [
     Spread { shape: 0.17, scale: 0.3 },
     Spread { shape: 0.3, scale: 0.3 },
 ];
-
-/// Largest standard deviation that is treated as a small difference of all bodies.
-const SMALL: f64 = 0.03;
 
 /// The ten nominal values of a body.
 pub(super) fn nominal_values(robot: &ParametricModel, body: usize) -> DVector<f64> {

@@ -11,13 +11,6 @@ use dynident_estimation::{HALF_WIDTH_95, LinearProblem};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Probability of a change below which a body keeps the values of the description. It is twice the prior probability,
-/// which is also the result for a body without effect on the torque.
-const MAX_UNCHANGED_PROBABILITY: f64 = 0.1;
-
-/// Minimum mass of a changed body, relative to its mass in the description.
-const MIN_MASS_RATIO: f64 = 0.1;
-
 /// Expected torque error if a body gets the values of the description again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -47,8 +40,9 @@ pub(crate) fn knowledge_of(
         let own = &robot.nominal()[10 * index..10 * index + 10];
         let settings = found.bodies.entry(body.name().to_owned()).or_default();
         if named.contains(&index) {
-            settings.prior = Some(changed_body(own, &differences.change_of(explanation, index).0));
-        } else if differences.body_probability(index, limits) < MAX_UNCHANGED_PROBABILITY {
+            settings.prior =
+                Some(changed_body(own, &differences.change_of(explanation, index).0, limits.min_mass_ratio));
+        } else if differences.body_probability(index, limits) < limits.max_unchanged_probability {
             settings.prior_std = Some(differences.sizes[explanation.covariance].largest());
         }
     }
@@ -57,12 +51,12 @@ pub(crate) fn knowledge_of(
 
 /// A physically consistent body with the mass and first moment of `nominal + change`; it also has the inertia of this
 /// sum if that is consistent.
-fn changed_body(nominal: &[f64], change: &DVector<f64>) -> [f64; 10] {
+fn changed_body(nominal: &[f64], change: &DVector<f64>, min_mass_ratio: f64) -> [f64; 10] {
     let sum: [f64; 10] = core::array::from_fn(|k| nominal[k] + change[k]);
     if consistent_body(&sum).0 {
         return sum;
     }
-    let mass = sum[0].max(MIN_MASS_RATIO * nominal[0]);
+    let mass = sum[0].max(min_mass_ratio * nominal[0]);
     let ratio = mass / nominal[0];
     let [from, to] =
         [[nominal[1], nominal[2], nominal[3]].map(|h| h / nominal[0]), [sum[1], sum[2], sum[3]].map(|h| h / mass)];
@@ -136,13 +130,13 @@ mod tests {
         // A physically consistent load is added unchanged. A change that gives no possible body keeps only mass and
         // first moment.
         let load = DVector::from_vec(vec![1.0, 0.1, 0.0, 0.0, 0.01, 0.0, 0.0, 0.02, 0.0, 0.02]);
-        let sum = changed_body(&nominal, &load);
+        let sum = changed_body(&nominal, &load, 0.1);
         assert!((0..10).all(|k| (sum[k] - nominal[k] - load[k]).abs() < 1e-12), "{sum:?}");
         let impossible = DVector::from_vec(vec![1.0, 0.5, 0.0, 0.3, -0.2, 0.0, 0.0, -0.2, 0.0, -0.1]);
-        let found = changed_body(&nominal, &impossible);
+        let found = changed_body(&nominal, &impossible, 0.1);
         assert!(consistent_body(&found).0 && found[0] == 3.0, "{found:?}");
         assert!((1..4).all(|k| (found[k] - nominal[k] - impossible[k]).abs() < 1e-12));
-        let removed = changed_body(&nominal, &DVector::from_vec(vec![-5.0; 10]));
+        let removed = changed_body(&nominal, &DVector::from_vec(vec![-5.0; 10]), 0.1);
         assert!(consistent_body(&removed).0, "{removed:?}");
     }
 }

@@ -5,11 +5,6 @@ use super::motion_rows::MotionRows;
 use super::span::dot;
 use crate::diagnosis_settings::ChannelSettings;
 
-/// Maximum relative difference between duplicate columns, which rounding in the filters causes.
-const MAX_DIFFERENCE: f64 = 1.0e-6;
-/// Maximum relative difference between a position and a torque from the same column, which pass different filters.
-const MAX_DIFFERENCE_OF_FILTERS: f64 = 1.0e-2;
-
 /// Two joints whose values come from the same column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DuplicateChannel {
@@ -28,7 +23,7 @@ pub(super) fn duplicate_channels(rows: &MotionRows, left: &[f64], settings: &Cha
     for (channels, columns) in [(Channels::Position, &rows.q), (Channels::Torque, &rows.tau)] {
         for a in 0..columns.len() {
             for b in a + 1..columns.len() {
-                if is_compared(a, b) && is_multiple(&columns[a], &columns[b], MAX_DIFFERENCE) {
+                if is_compared(a, b) && is_multiple(&columns[a], &columns[b], settings.max_difference_of_duplicate) {
                     found.push(DuplicateChannel { channels, joints: [a, b] });
                 }
             }
@@ -36,7 +31,7 @@ pub(super) fn duplicate_channels(rows: &MotionRows, left: &[f64], settings: &Cha
     }
     for (a, q) in rows.q.iter().enumerate() {
         for (b, tau) in rows.tau.iter().enumerate() {
-            if is_compared(a, b) && is_multiple(q, tau, MAX_DIFFERENCE_OF_FILTERS) {
+            if is_compared(a, b) && is_multiple(q, tau, settings.max_difference_of_filters) {
                 found.push(DuplicateChannel { channels: Channels::Both, joints: [a, b] });
             }
         }

@@ -3,6 +3,7 @@
 
 use super::channels::Channels;
 use super::explanation::predicted;
+use super::joint_fits::MIN_RESIDUAL_SHARE;
 use super::lag_search::LagSearch;
 use super::mistakes::{Breadth, Mistake, Setup};
 use super::motion_rows::{INSTANTS, MotionRows};
@@ -10,9 +11,6 @@ use super::plausibility::beyond_limits;
 use crate::diagnosis_settings::DiagnosisSettings;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
-
-/// Minimum unexplained share of a joint's torque; smaller shares are treated as equal to it.
-const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
 /// A mistake of one held-out log. After its correction, the parameters from the training logs explain the log.
 #[derive(Clone, Debug, PartialEq)]

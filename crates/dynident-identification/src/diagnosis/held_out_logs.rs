@@ -19,6 +19,21 @@ pub(super) struct HeldOutLogs {
     pub(super) repeated_motions: Vec<usize>,
 }
 
+enum Cause {
+    Payload(UnmodelledPayload),
+    Mistake(HeldOutHypothesis),
+}
+
+impl Cause {
+    /// Root mean square residual of all joints that it leaves, Nm.
+    fn left(&self) -> f64 {
+        match self {
+            Self::Payload(payload) => payload.left_with,
+            Self::Mistake(mistake) => mistake.left_without,
+        }
+    }
+}
+
 pub(super) struct TrainingResult<'a> {
     pub(super) model: &'a RegressorModel,
     pub(super) rows: &'a MotionRows,
@@ -34,35 +49,33 @@ pub(super) struct TrainingResult<'a> {
 /// The payload or the mistake of each held-out log that explains the log clearly better than two alternatives: the
 /// robot of the training logs, and one robot for all logs. It is reported only if neither the parameters from all rows
 /// nor those of a physically consistent robot ([`Hypothesis::parameters`]) explain the log. The reason: free parameters
-/// that the training motion does not excite cannot predict the torque of another motion.
+/// that the training motion does not excite cannot predict the torque of another motion. If both parameter sets lead to
+/// different causes, the one that leaves the smaller residual is reported.
 pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &TrainingResult<'_>) -> Result<HeldOutLogs, DiagnosisError> {
     let (robot, settings) = (&trained.model.parametric, trained.settings);
     let mut found = HeldOutLogs::default();
-    for log in logs.of_role(Role::Validate) {
-        let samples = [MotionSamples::of_recording(logs, trained.model, log, settings.motion.max_interpolated)?];
+    let is_bare = |log: &usize| logs.recordings[*log].payload.is_none();
+    for log in logs.of_role(Role::Validate).into_iter().filter(is_bare) {
+        let samples = [MotionSamples::of_recording(logs, trained.model, log, &settings.motion)?];
         let rows = samples[0].instants(INSTANTS);
         if repeats_motion(trained.rows, &rows, &settings.held_out) {
             found.repeated_motions.push(log);
         }
         let lag_search = LagSearch::new(robot, &samples, trained.compensated_s.to_vec(), settings);
-        let (mut payload, mut hypothesis) = (None, None);
-        for theta in trained.theta.into_iter().chain([&trained.as_written.parameters[..]]) {
+        let explained = |theta: &[f64]| {
             let known = KnownRobot { robot, theta, left: &trained.as_written.left, settings };
-            payload = unmodelled_payload(robot, &rows, log, theta, &settings.held_out);
-            hypothesis = held_out_hypothesis(known, &rows, lag_search.as_ref(), log);
-            if let (Some(with), Some(without)) = (&payload, &hypothesis) {
-                if with.left_with < without.left_without { hypothesis = None } else { payload = None }
+            let payload = unmodelled_payload(robot, &rows, log, theta, &settings.held_out).map(Cause::Payload);
+            let mistake = held_out_hypothesis(known, &rows, lag_search.as_ref(), log).map(Cause::Mistake);
+            payload.into_iter().chain(mistake).min_by(|a, b| a.left().total_cmp(&b.left()))
+        };
+        let parameters = trained.theta.into_iter().chain([&trained.as_written.parameters[..]]);
+        let Some(causes) = parameters.map(explained).collect::<Option<Vec<_>>>() else { continue };
+        let Some(cause) = causes.into_iter().min_by(|a, b| a.left().total_cmp(&b.left())) else { continue };
+        if left_of_one_robot(&rows, trained)? > settings.held_out.max_ratio_of_one_robot * cause.left() {
+            match cause {
+                Cause::Payload(payload) => found.payloads.push(payload),
+                Cause::Mistake(mistake) => found.hypotheses.push(mistake),
             }
-            if payload.is_none() && hypothesis.is_none() {
-                break;
-            }
-        }
-        let left = payload.as_ref().map(|payload| payload.left_with);
-        let left = left.or(hypothesis.as_ref().map(|hypothesis| hypothesis.left_without));
-        let Some(left) = left else { continue };
-        if left_of_one_robot(&rows, trained)? > settings.held_out.max_ratio_of_one_robot * left {
-            found.payloads.extend(payload);
-            found.hypotheses.extend(hypothesis);
         }
     }
     Ok(found)

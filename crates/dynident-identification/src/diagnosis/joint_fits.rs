@@ -17,7 +17,7 @@ const WEIGHTING_ROUNDS: usize = 3;
 const RIDGE: f64 = 1.0e-10;
 
 /// Minimum residual as a share of the torque. Without it, rounding errors would decide in noise-free simulations.
-const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
+pub(super) const MIN_RESIDUAL_SHARE: f64 = 1.0e-2;
 
 /// A motion with several torques for each joint. One pass over the rows serves all hypotheses that differ only in the
 /// torque.

@@ -1,21 +1,13 @@
 //! A few hundred instants of a recording, for the comparison of hypotheses.
 
 use super::channels::Channels;
+use crate::diagnosis_settings::MotionLimits;
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, motion_band_hz};
 
 /// Number of instants; more instants do not improve the accuracy.
 pub(super) const INSTANTS: usize = 300;
-
-/// Velocity below which a joint is at rest, relative to its root mean square velocity. The friction of a joint at rest
-/// can have any value up to the friction in motion, so its torque does not test a robot model.
-const REST_SHARE: f64 = 0.02;
-/// Instants with a joint at rest are excluded only if at least this number of instants remains.
-const MIN_MOVING: usize = 100;
-/// Instants with a joint at rest are excluded only if their share is at least this large. In a continuous motion of
-/// seven joints, the reversals alone are about a tenth of the instants.
-const MIN_RESTING_SHARE: f64 = 0.15;
 
 /// Ratio of the standard deviation of a normal distribution to the median of its magnitude.
 const NORMAL_DEVIATION_OF_MEDIAN: f64 = 1.4826;
@@ -65,13 +57,12 @@ pub(super) struct MotionSamples {
 }
 
 impl MotionSamples {
-    /// Reads the recording with this index, or the excerpt of a long recording. `max_interpolated` is
-    /// [`MotionLimits::max_interpolated`](super::MotionLimits::max_interpolated).
+    /// Reads the recording with this index, or the excerpt of a long recording.
     pub(super) fn of_recording(
         logs: &Logs<'_>,
         model: &RegressorModel,
         index: usize,
-        max_interpolated: f64,
+        limits: &MotionLimits,
     ) -> Result<Self, LogError> {
         let pass = logs.pass_for_instants(model, index);
         let recording = pass.recording;
@@ -127,7 +118,7 @@ impl MotionSamples {
             Ok(())
         };
         pass.each_block(&mut take)?;
-        let resting = resting(&rows);
+        let (resting, max_interpolated) = (resting(&rows, limits), limits.max_interpolated);
         Ok(Self { rows, pieces, spacing_s, rows_of_fit, interpolated, max_interpolated, resting })
     }
 
@@ -205,18 +196,18 @@ impl MotionSamples {
 }
 
 /// For each row, whether a joint rests that moves in other rows. Empty for a motion without pauses
-/// ([`MIN_RESTING_SHARE`]), and if fewer than [`MIN_MOVING`] other rows would remain.
-fn resting(rows: &MotionRows) -> Vec<bool> {
+/// ([`MotionLimits::min_rest_share`]), and if too few other rows would remain.
+fn resting(rows: &MotionRows, limits: &MotionLimits) -> Vec<bool> {
     let mut resting = vec![false; rows.len()];
     for dq in &rows.dq {
         let rms = (dq.iter().map(|speed| speed * speed).sum::<f64>() / dq.len().max(1) as f64).sqrt();
         for (rests, speed) in resting.iter_mut().zip(dq) {
-            *rests |= speed.abs() < REST_SHARE * rms;
+            *rests |= speed.abs() < limits.max_rest_velocity * rms;
         }
     }
     let moving = resting.iter().filter(|rests| !**rests).count();
-    let is_continuous = ((rows.len() - moving) as f64) < MIN_RESTING_SHARE * rows.len() as f64;
-    if moving < MIN_MOVING || is_continuous { Vec::new() } else { resting }
+    let is_continuous = ((rows.len() - moving) as f64) < limits.min_rest_share * rows.len() as f64;
+    if moving < limits.min_moving_instants || is_continuous { Vec::new() } else { resting }
 }
 
 /// Parallel filter for instants. It gives four times as many rows as the filter of a fit, because short logs would
@@ -411,10 +402,11 @@ mod tests {
             q: vec![vec![0.0; count]; 3],
             ..MotionRows::empty(3)
         };
-        let of_400 = resting(&rows(400));
+        let limits = MotionLimits::default();
+        let of_400 = resting(&rows(400), &limits);
         assert!((0..400).all(|row| of_400[row] == ((row / 50) % 2 == 1)));
         // 100 moving instants are enough, 90 are not.
-        assert_eq!(resting(&rows(150)).iter().filter(|rests| !**rests).count(), 100);
-        assert!(resting(&rows(140)).is_empty());
+        assert_eq!(resting(&rows(150), &limits).iter().filter(|rests| !**rests).count(), 100);
+        assert!(resting(&rows(140), &limits).is_empty());
     }
 }

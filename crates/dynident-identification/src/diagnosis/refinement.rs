@@ -11,6 +11,8 @@ use dynident_dynamics::ParametricModel;
 const MAX_FITTED_UNITS: usize = 4;
 /// Step of the search for the range of a factor, as the logarithm of the factor.
 const RANGE_STEP: f64 = 0.2;
+/// Distance to which the range of a sample rate is searched, as the logarithm of the factor: a decimal place.
+const RATE_REACH: f64 = core::f64::consts::LN_10;
 /// Accuracy of the ends of the range of a factor, as the logarithm of the factor.
 const RANGE_ACCURACY: f64 = 0.03;
 
@@ -30,14 +32,32 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
         None => hypothesis.lower_bound(),
     };
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
-    let found = at.without(&last.with_best_number(free)?).explained(consistency).ok()?;
     // A free number partly fits the noise. Therefore a round number is kept unless the free number is clearly better.
-    let is_better = if facts.number.is_none_or(|number| number.is_round) {
-        found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
-    } else {
-        value(&found.hypothesis) < value(&first.hypothesis)
+    let is_better = |found: &Explained| {
+        if facts.number.is_none_or(|number| number.is_round) {
+            found.hypothesis.score() < first.hypothesis.score() - at.settings.score.min_gain
+        } else {
+            value(&found.hypothesis) < value(&first.hypothesis)
+        }
     };
-    is_better.then_some(found)
+    let better = last.with_best_number(free).and_then(|better| at.without(&better).explained(consistency).ok());
+    let better = better.filter(is_better);
+    // A unit is preferred to another factor nearby, unless it is clearly worse.
+    let unit = better.as_ref().and_then(|better| better.hypothesis.mistakes.last()?.nearest_unit());
+    let unit = unit.and_then(|unit| at.without(&unit).explained(consistency).ok());
+    let better = match (better, unit) {
+        (Some(free), Some(unit)) if unit.hypothesis.score() < free.hypothesis.score() + at.settings.score.min_gain => {
+            Some(unit)
+        }
+        (better, _) => better,
+    };
+    if !facts.is_other_rate {
+        return better;
+    }
+    let mut best = better.unwrap_or_else(|| first.clone());
+    let last = best.hypothesis.mistakes.last()?;
+    best.hypothesis.factors_alike = factor_range(last, RATE_REACH, 2.0 * at.settings.score.min_gain, free);
+    Some(best)
 }
 
 /// The hypothesis with the best unit of positions. For each unit, the widths of the smoothed friction signs are fitted
@@ -71,7 +91,7 @@ fn refined_with_own_steps(
     // twice `min_gain` is used.
     let max_increase = 2.0 * at.settings.score.min_gain;
     let value = |mistake: &Mistake| free_bound(at, &best.study.robot, last, mistake);
-    best.hypothesis.factors_alike = factor_range(last, max_increase, value);
+    best.hypothesis.factors_alike = factor_range(last, number.reach, max_increase, value);
     Some(best)
 }
 
@@ -87,10 +107,10 @@ fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistak
     found.map_or(f64::INFINITY, |found| found.lower_bound())
 }
 
-/// Smallest and largest position factor around that of `mistake` for which `value` increases by at most `max_increase`.
-fn factor_range(mistake: &Mistake, max_increase: f64, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
-    let facts = mistake.facts();
-    let (factor, reach) = (facts.position_factor?, facts.number?.reach);
+/// Smallest and largest factor around that of `mistake` for which `value` increases by at most `max_increase`. The
+/// search ends at a distance of `reach`, as the logarithm of the factor.
+fn factor_range(mistake: &Mistake, reach: f64, max_increase: f64, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
+    let factor = mistake.facts().number?.at;
     let at = |log: f64| value(&mistake.with_number(factor * log.exp()));
     let limit = at(0.0) + max_increase;
     let edge = |direction: f64| {

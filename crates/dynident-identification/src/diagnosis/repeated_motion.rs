@@ -3,9 +3,6 @@
 use super::motion_rows::MotionRows;
 use crate::diagnosis_settings::HeldOutSettings;
 
-/// Smallest number of joints: the motions of fewer joints pass near each other without being equal.
-const MIN_JOINTS: usize = 3;
-
 /// Whether almost all instants of `held_out` have the positions and velocities of an instant of `training`.
 pub(super) fn repeats_motion(training: &MotionRows, held_out: &MotionRows, settings: &HeldOutSettings) -> bool {
     let ranges: Vec<f64> = training.q.iter().chain(&training.dq).map(|values| range(values)).collect();
@@ -19,7 +16,8 @@ pub(super) fn repeats_motion(training: &MotionRows, held_out: &MotionRows, setti
         path.windows(2).any(|ends| distance(&state, &ends[0], &ends[1]) <= settings.max_distance_of_repeat)
     };
     let near = (0..held_out.len()).filter(is_near).count();
-    training.q.len() >= MIN_JOINTS && near as f64 >= settings.min_share_of_repeat * held_out.len().max(1) as f64
+    training.q.len() >= settings.min_joints_of_repeat
+        && near as f64 >= settings.min_share_of_repeat * held_out.len().max(1) as f64
 }
 
 fn range(values: &[f64]) -> f64 {

@@ -45,8 +45,7 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let DiagnosisTask { logs, settings, robot, training, .. } = task;
     let model = RegressorModel::from(robot.clone());
     let limits = &settings.diagnosis_limits;
-    let of_recording =
-        |&index: &usize| MotionSamples::of_recording(logs, &model, index, limits.motion.max_interpolated);
+    let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index, &limits.motion);
     let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
     for (place, one) in samples.iter().enumerate() {

@@ -8,8 +8,6 @@ use nalgebra::{DMatrix, DVector};
 
 /// Regularisation that is added to the squares of the columns, relative to the largest square.
 const RIDGE: f64 = 1.0e-9;
-/// Ratio of the number of residuals to the number of independent residuals; neighbouring residuals are correlated.
-const CORRELATED_RESIDUALS: f64 = 10.0;
 
 /// A payload at the last body in one log that the model does not contain.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +62,7 @@ pub(super) fn unmodelled_payload(
     let left = &rest - &matrix * &solution;
     let rms = |v: &DVector<f64>| v.norm() / ((dof * count).max(1) as f64).sqrt();
     let (left_without, left_with) = (rms(&rest), rms(&left));
-    let std = left_with * (CORRELATED_RESIDUALS * factor.inverse()[(0, 0)]).sqrt();
+    let std = left_with * (settings.residuals_per_independent * factor.inverse()[(0, 0)]).sqrt();
     let mass = solution[0];
     let is_better = left_with < settings.max_ratio_with_payload * left_without;
     (is_better && mass.abs() > settings.min_payload_deviations * std).then(|| UnmodelledPayload {

@@ -56,13 +56,11 @@ pub(super) fn spline_motion(
     logs.end();
     let estimation = rows.settings;
     let start = weighted_least_squares(problem, &estimation.weighted())?;
-    let mut held = vec![false; problem.columns().len()];
-    for fixed in &start.rank.fixed {
-        held[fixed.column] = true;
-    }
-    for &(column, _) in &estimation.held {
-        held[column] = true;
-    }
+    let is_held = |column: usize| {
+        start.rank.fixed.iter().any(|fixed| fixed.column == column)
+            || estimation.held.iter().any(|(held, _)| *held == column)
+    };
+    let held = (0..problem.columns().len()).map(is_held).collect();
     let begun = SplineMotionProblem {
         names: problem.columns().to_vec(),
         joints: model.joint_names(),

@@ -238,7 +238,7 @@ pub(crate) fn tested_on(
 ) -> Result<HeldOutExamination, LogError> {
     if let Some(share) = tested.offset_share {
         let plain = ModelUnderTest { offset_share: None, ..*tested };
-        return tested_on_rest(logs, (settings, limits), model, index, (&plain, share), alone);
+        return tested_on_rest(logs, (settings, limits), model, index, &plain, share, alone);
     }
     let ModelUnderTest { theta, physical, uncertainty, traced, .. } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
@@ -311,7 +311,8 @@ fn tested_on_rest(
     limits: (&EstimationSettings, &ExaminationSettings),
     model: &RegressorModel,
     index: usize,
-    (tested, share): (&ModelUnderTest<'_>, f64),
+    tested: &ModelUnderTest<'_>,
+    share: f64,
     alone: bool,
 ) -> Result<HeldOutExamination, LogError> {
     let sets: Vec<&[f64]> = [Some(tested.theta), tested.physical].into_iter().flatten().collect();

@@ -72,6 +72,11 @@ pub(super) fn further_columns(
     (0..further).filter(move |place| !fixed.contains(&(base + place))).map(move |place| wide_base + place)
 }
 
+/// Index of a term's column.
+fn place_of(model: &RegressorModel, term: &TorqueTerm) -> Option<usize> {
+    model.layout().columns().iter().position(|column| matches!(column, Column::Term(l) if l == term))
+}
+
 /// Selects the friction of the joints in `candidates`: pairs of a joint and its candidate columns, all of them columns
 /// of `wide_problem`. `plain` is the fit with the stated terms; `equal_weights` states whether its joints have equal
 /// weights. `limits` contains the thresholds of the search for each entry of `candidates`.
@@ -94,11 +99,9 @@ pub(crate) fn choose_friction(
     let weights = weights(plain, equal_weights);
     let rows = wide_problem.joint_rows();
     let norms = wide_problem.column_norms();
-    let place = |term: &TorqueTerm| {
-        wide.layout().columns().iter().position(|column| matches!(column, Column::Term(l) if l == term))
-    };
+    let place = |term: &TorqueTerm| place_of(wide, term);
     let of_joint =
-        |(joint, columns): (usize, &[CandidateColumn]), limits: &SearchLimits<'_>, before: &[Option<Vec<usize>>]| {
+        |joint: usize, columns: &[CandidateColumn], limits: &SearchLimits<'_>, before: &[Option<Vec<usize>>]| {
             let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
             let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
             let scale = JointScale::of(model.model(), joint);
@@ -133,7 +136,7 @@ pub(crate) fn choose_friction(
         let found: Vec<(JointFriction, Vec<usize>)> = candidates
             .par_iter()
             .zip(limits)
-            .map(|((joint, columns), limits)| of_joint((*joint, columns), limits, &before))
+            .map(|((joint, columns), limits)| of_joint(*joint, columns, limits, &before))
             .collect::<Result<_, EstimationError>>()?;
         (chosen, before) = found
             .into_iter()

@@ -213,6 +213,11 @@ impl LoadColumns {
         self.logs.iter().all(Option::is_none)
     }
 
+    /// Whether these logs contain the arm without payloads and separate offsets.
+    pub fn are_plain(&self, logs: &[usize]) -> bool {
+        logs.iter().all(|&log| self.logs[log].is_none())
+    }
+
     /// Number of base parameters of the arm.
     pub fn base(&self) -> usize {
         self.base

@@ -114,7 +114,7 @@ pub(super) fn controller_payload(
     let mut shape_std = SHAPE_STD;
     let mut found = *nearest;
     for _ in 0..WEAKENINGS {
-        let one = shrunk(data, (mass, [cx, cy, cz]), &about, moment, shape_std)?;
+        let one = shrunk(data, mass, [cx, cy, cz], &about, moment, shape_std)?;
         if is_inside(&at_centre_of_mass(&one), figures) {
             found = one;
             break;
@@ -226,7 +226,8 @@ fn probable_moment(data: &Determined, about: &DMatrix<f64>, by_density: f64) -> 
 /// The physically consistent body with the smallest sum of squared distances from the logs and from the sphere.
 fn shrunk(
     data: &Determined,
-    (mass, com): (f64, [f64; 3]),
+    mass: f64,
+    com: [f64; 3],
     about: &DMatrix<f64>,
     moment: f64,
     shape_std: f64,

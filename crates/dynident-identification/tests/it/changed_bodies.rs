@@ -27,8 +27,10 @@ fn named_bodies(change: impl Fn(usize, &InertialParameters) -> InertialParameter
     let values = DVector::from_fn(rows.len(), |row, _| truth[row] + ERROR_SHARE * std(row) * random.normal());
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| if a == b { std(a).powi(2) } else { 0.0 });
     let knowledge = ConsistencySettings::default();
-    let found = Differences::from_description(&robot, &rows, &values, &covariance, &knowledge).unwrap().unwrap();
-    found.followed(&DescriptionThresholds::default()).map_or_else(Vec::new, |own| found.bodies_of(own))
+    let limits = DescriptionThresholds::default();
+    let found = Differences::from_description(&robot, &rows, &values, &covariance, &knowledge, &limits);
+    let found = found.unwrap().unwrap();
+    found.followed(&limits).map_or_else(Vec::new, |own| found.bodies_of(own))
 }
 
 fn load(mass_kg: f64, at: [f64; 3]) -> InertialParameters {

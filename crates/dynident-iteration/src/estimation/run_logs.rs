@@ -69,6 +69,7 @@ pub(crate) fn identification_settings(
     identification.estimation = settings.estimation.clone();
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
+    identification.thresholds.clone_from(&settings.thresholds);
     // Friction that is poorly determined would prevent convergence.
     identification.friction = settings.friction.clone().with_searches(|own| FrictionSearch {
         most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),

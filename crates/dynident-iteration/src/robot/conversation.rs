@@ -48,8 +48,8 @@ pub(super) fn run(
                     return Err(RobotFault::TooMuch { most, duration_s: reference.duration_s() });
                 }
                 recorder.enter(part)?;
-                let order = (&client.places[..], &client.torque_per_unit[..]);
-                let dq = keep_sample(order, recorder.record(), (t_s, &q, dq.as_deref(), &tau))?;
+                let (places, torque_per_unit) = (&client.places, &client.torque_per_unit);
+                let dq = keep_sample(places, torque_per_unit, recorder.record(), t_s, &q, dq.as_deref(), &tau)?;
                 stream.arrived(Instant::now(), whole_s - recorder.left_s());
                 if let Some(status) = stopped_if_unsafe(client, recorder, dq.as_deref(), most) {
                     return Ok(status);
@@ -123,18 +123,20 @@ fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason
             && fine
             && recorder.samples() < most
         {
-            let sent = (*t_s, &q[..], dq.as_deref(), &tau[..]);
-            fine = recorder.enter(*part).is_ok() && keep_sample((&order.0, &order.1), recorder.record(), sent).is_ok();
+            fine = recorder.enter(*part).is_ok()
+                && keep_sample(&order.0, &order.1, recorder.record(), *t_s, q, dq.as_deref(), tau).is_ok();
         }
     })
 }
 
-type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
-
 fn keep_sample(
-    (places, torque_per_unit): (&[usize], &[f64]),
+    places: &[usize],
+    torque_per_unit: &[f64],
     record: &mut Record,
-    (t_s, q, dq, tau): SentSample<'_>,
+    t_s: Option<f64>,
+    q: &[Option<f64>],
+    dq: Option<&[Option<f64>]>,
+    tau: &[Option<f64>],
 ) -> Result<Option<Vec<f64>>, RobotFault> {
     let sample = record.samples;
     let time_s = time(t_s, sample, record.times_s.last())?;

@@ -127,7 +127,7 @@ mod tests {
     use std::time::Duration;
 
     /// `samples` at `rate_hz` of the motion, which arrive `pace` times as fast.
-    fn watched(silence_s: Option<f64>, (samples, rate_hz, pace): (u32, f64, f64)) -> StreamWatch {
+    fn watched(silence_s: Option<f64>, samples: u32, rate_hz: f64, pace: f64) -> StreamWatch {
         let begin = Instant::now();
         let mut watch = StreamWatch::new(silence_s);
         for sample in 0..samples {
@@ -142,12 +142,12 @@ mod tests {
         let limit = |watch: StreamWatch| watch.limit_s();
         let is = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
         // 1.1 s at 500 Hz; 3 s at 20 Hz.
-        assert!(is(limit(watched(None, (550, 500.0, 1.0))), 0.2));
-        assert!(is(limit(watched(None, (61, 20.0, 1.003))), 0.5));
-        assert!(is(limit(watched(Some(0.1), (550, 500.0, 1.0))), 0.1));
+        assert!(is(limit(watched(None, 550, 500.0, 1.0)), 0.2));
+        assert!(is(limit(watched(None, 61, 20.0, 1.003)), 0.5));
+        assert!(is(limit(watched(Some(0.1), 550, 500.0, 1.0)), 0.1));
         // Too few samples; samples after the motion; a fast simulator, a slow one.
         for (samples, pace) in [(450, 1.0), (5000, 50.0), (5000, 1.02), (5000, 0.98), (1, 1.0)] {
-            assert_eq!(limit(watched(None, (samples, 500.0, pace))), None, "{samples} {pace}");
+            assert_eq!(limit(watched(None, samples, 500.0, pace)), None, "{samples} {pace}");
         }
         assert_eq!(StreamWatch::new(None).limit_s(), None);
     }

@@ -80,16 +80,25 @@ pub(crate) fn ways_of(
     task.legs.iter().map(of_leg).collect()
 }
 
+/// A planned run with its controller, and the paths from and to the home posture for each leg.
+pub(crate) struct Planned<'a> {
+    pub(crate) plan: &'a RunPlan,
+    pub(crate) controller: &'a ControllerSettings,
+    pub(crate) model: Option<&'a ControllerModel>,
+    pub(crate) ways: &'a [Option<FoundPaths>],
+}
+
 /// Simulates (rehearses) a plan if the settings request it. `robot` includes the selected friction.
 pub(crate) fn rehearsed<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
     robot: &ParametricModel,
-    (plan, controller, model): (&RunPlan, &ControllerSettings, Option<&ControllerModel>),
-    (ways, stop): (&[Option<FoundPaths>], &dyn Fn() -> bool),
+    planned: &Planned<'_>,
     before: &[RunRecord],
+    stop: &dyn Fn() -> bool,
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
+    let Planned { plan, controller, model, ways } = *planned;
     // Parameters of the simulated robot, in order of preference: the controller's model after a good run, the newest
     // estimate, the nominal model with typical drives.
     let shown = before.iter().rev().find_map(|record| record.knowledge()?.possible.as_deref());

@@ -4,7 +4,7 @@ use crate::policy::next_step::RunPlan;
 use crate::policy::record::RunRecord;
 use crate::policy::supervision::{BegunMotion, Supervisor};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
-use crate::runs::before_motion::{Commanded, next_motion, rehearsed, ways_of};
+use crate::runs::before_motion::{Commanded, Planned, next_motion, rehearsed, ways_of};
 use crate::runs::iteration::Iteration;
 use crate::setup::error::IterationError;
 use crate::setup::home::{FoundPaths, HomeError};
@@ -67,8 +67,8 @@ impl Iteration {
             Err(HomeError::Interrupted) => return interrupted(),
             Err(error) => return refused(&error),
         };
-        let with = (plan, &controller, model.as_ref());
-        match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
+        let planned = Planned { plan, controller: &controller, model: model.as_ref(), ways: &ways };
+        match rehearsed(task, settings, &robot, &planned, before, &stopped)? {
             Ok(rehearsal) => {
                 let known = before.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
                 let known = known.map(|known| (robot.into_owned(), known.clone()));
@@ -128,28 +128,35 @@ impl Iteration {
         if observed {
             supervisor.ended(&robot_run);
         }
+        Ok(MotionOutcome::of(robot_run, plan.run))
+    }
+}
+
+impl MotionOutcome {
+    /// Outcome of a motion of run number `run`.
+    fn of(robot_run: RobotRun, run: usize) -> Self {
         let has_begun =
             robot_run.record.samples > 0 || robot_run.ways.as_ref().is_some_and(|ways| ways.approach.samples > 0);
         let cut_short = |robot_run: RobotRun| {
-            let how = format!("run {}: {}", plan.run, robot_run.status);
-            MotionOutcome::CutShort(Some(robot_run), CutShort::Failed(how))
+            let how = format!("run {run}: {}", robot_run.status);
+            Self::CutShort(Some(robot_run), CutShort::Failed(how))
         };
-        Ok(match &robot_run.status {
+        match &robot_run.status {
             RobotStatus::Waiting { .. } => {
-                MotionOutcome::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
+                Self::Stopped(IterationStatus::Waiting { reason: robot_run.status.to_string() })
             }
             RobotStatus::Failed { .. } => cut_short(robot_run),
             // If a robot did not move, its log contains no information about the controller.
             RobotStatus::Stopped { .. } if !has_begun => cut_short(robot_run),
             RobotStatus::Interrupted { .. } => {
                 let how = robot_run.status.to_string();
-                MotionOutcome::CutShort(Some(robot_run), CutShort::Interrupted(how))
+                Self::CutShort(Some(robot_run), CutShort::Interrupted(how))
             }
             RobotStatus::Done
             | RobotStatus::Simulated { .. }
             | RobotStatus::Stopped { .. }
             | RobotStatus::Oscillated { .. }
-            | RobotStatus::LeftEnvelope { .. } => MotionOutcome::Run(robot_run),
-        })
+            | RobotStatus::LeftEnvelope { .. } => Self::Run(robot_run),
+        }
     }
 }

@@ -169,7 +169,7 @@ impl HomeSettings {
     ) -> Result<FoundPaths, HomeError> {
         self.validate(model.dof())?;
         require_length("joints of the motion", model.dof(), motion.joints())?;
-        let planner = Planner::new(self, model, motion, (envelope, stop))?;
+        let planner = Planner::new(self, model, motion, envelope, stop)?;
         let samples = motion.samples();
         let posture = |sample: usize| -> Vec<f64> {
             (0..motion.joints()).map(|joint| motion.motion().q[joint * samples + sample]).collect()
@@ -228,7 +228,8 @@ impl<'a> Planner<'a> {
         home: &'a HomeSettings,
         model: &'a Model,
         motion: &Reference,
-        (envelope, stop): (Option<&Envelope>, &'a dyn Fn() -> bool),
+        envelope: Option<&Envelope>,
+        stop: &'a dyn Fn() -> bool,
     ) -> Result<Self, HomeError> {
         let mut limits = home.limits.clone();
         for limit in &mut limits.joints {

@@ -1,11 +1,11 @@
 use crate::setup::safety::SafetySettings;
 use crate::setup::torque_check_settings::TorqueCheckSettings;
 use crate::setup::verdict_settings::VerdictSettings;
-use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
 use dynident_identification::friction::FrictionSource;
 use dynident_identification::payload::Payload;
+use dynident_identification::{DecisionThresholds, EstimationSettings};
 use dynident_model::Model;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
 use dynident_simulation::controllers::{ControllerSettings, FiniteTimeSettings, JointPdSettings};
@@ -70,6 +70,8 @@ pub struct RunIdentificationSettings {
     pub payloads: Vec<Payload>,
     /// Whether runs that are fitted together share the constant torque offsets of their joints.
     pub run_offsets: RunOffsets,
+    /// Thresholds of the decisions before the last fit.
+    pub thresholds: DecisionThresholds,
 }
 
 impl Default for RunIdentificationSettings {
@@ -90,6 +92,7 @@ impl Default for RunIdentificationSettings {
             consistency: Some(ConsistencySettings::default()),
             payloads: Vec::new(),
             run_offsets: RunOffsets::default(),
+            thresholds: DecisionThresholds::default(),
         }
     }
 }

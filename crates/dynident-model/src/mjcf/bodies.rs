@@ -4,13 +4,14 @@ use super::classes::{ClassId, Classes, MAIN, Stated};
 use super::compiler::{Compiler, FromGeoms};
 use super::expanded::{Element, Expanded, Place};
 use super::fault::{MjcfError, MjcfFault};
-use super::floating::{ActuatedNames, Dropped, free_joint, is_free};
+use super::floating::{ActuatedNames, free_joint, is_free};
 use super::geoms::{Geom, GeomMass, geom};
 use super::inertials::{corrected, inertial};
 use super::joints::{JointElement, joint, nested_free_joint};
 use super::meshes::Meshes;
 use super::notices::{MjcfLoss, Notices};
 use super::orientation::place;
+use super::tree::{LinkPlace, Tree, WORLD};
 use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
@@ -19,8 +20,6 @@ use crate::tree::{Body, Link};
 use crate::urdf::MAX_MOVING_JOINTS;
 use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
-
-pub(super) const WORLD: &str = "world";
 
 /// Elements of a body that do not influence its dynamics.
 const NON_DYNAMIC_ELEMENTS: [&str; 4] = ["site", "camera", "light", "plugin"];
@@ -69,50 +68,6 @@ const IN_JOINT: [&str; 25] = [
     "user",
     "align",
 ];
-
-#[derive(Clone, Debug)]
-pub(super) struct LinkPlace {
-    pub(super) name: String,
-    /// The `<body>` element; `None` for a link between two joints of one body, which has no element.
-    pub(super) body: Option<Place>,
-    /// Origin of the link's frame in the body's frame, m; the axes are the same.
-    pub(super) origin: Vec3,
-}
-
-pub(super) struct Tree {
-    pub(super) joints: Vec<Joint>,
-    /// Elements of the joints, in the same order.
-    pub(super) joint_places: Vec<Place>,
-    /// Positions in the pose as drawn (`ref`), in the same order, rad or m.
-    pub(super) references: Vec<f64>,
-    pub(super) bodies: Vec<Body>,
-    pub(super) base: Body,
-    pub(super) links: Vec<LinkPlace>,
-    pub(super) unknown: HashSet<String>,
-    /// Objects of the scene that are not part of the robot.
-    pub(super) dropped: Dropped,
-}
-
-impl Tree {
-    fn new() -> Self {
-        let world =
-            Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
-        Self {
-            joints: Vec::new(),
-            joint_places: Vec::new(),
-            references: Vec::new(),
-            bodies: Vec::new(),
-            base: Body { links: vec![world] },
-            links: Vec::new(),
-            unknown: HashSet::new(),
-            dropped: Dropped::default(),
-        }
-    }
-
-    fn all_links(&mut self) -> impl Iterator<Item = &mut Link> {
-        self.bodies.iter_mut().chain([&mut self.base]).flat_map(|body| &mut body.links)
-    }
-}
 
 #[derive(Clone, Copy)]
 struct PendingBody<'t> {

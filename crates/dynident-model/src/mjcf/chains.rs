@@ -3,11 +3,11 @@
 //! The two points are the anchor and the point that coincides with it in the pose as drawn. MJCF does not mark
 //! passive joints: the joints of the chain that have no actuator and follow no other joint are treated as passive.
 
-use super::bodies::LinkPlace;
 use super::classes::Stated;
 use super::expanded::Expanded;
 use super::fault::{MjcfError, MjcfFault};
 use super::notices::{MjcfLoss, Notices};
+use super::tree::LinkPlace;
 use crate::error::ModelError;
 use crate::loops::{self, LoopClosure, LoopError};
 use crate::spatial::{Transform, Vec3};

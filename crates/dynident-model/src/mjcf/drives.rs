@@ -1,12 +1,12 @@
 //! `<actuator>`, `<equality>`, `<tendon>`, `<option>`: effort limits, mimic joints, gravity, and notices of unsupported
 //! contents.
 
-use super::bodies::{Tree, WORLD};
 use super::chains::Connect;
 use super::classes::{Classes, MAIN, Stated};
 use super::expanded::{Element, Expanded};
 use super::fault::{MjcfError, MjcfFault};
 use super::notices::{MjcfLoss, Notices};
+use super::tree::{Tree, WORLD};
 use crate::joint::Mimic;
 use crate::spatial::Vec3;
 use crate::tree::STANDARD_GRAVITY;

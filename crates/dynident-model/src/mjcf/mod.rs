@@ -39,6 +39,7 @@ mod joints;
 mod meshes;
 mod notices;
 mod orientation;
+mod tree;
 mod values;
 mod write;
 mod write_servos;
@@ -53,7 +54,7 @@ pub use write_servos::{ServoChange, rewrite_servos};
 
 use crate::collision::read_mujoco_mesh;
 use crate::tree::Model;
-use bodies::{LinkPlace, Reader, Tree};
+use bodies::Reader;
 use chains::ChainContext;
 use classes::Classes;
 use compiler::Compiler;
@@ -62,6 +63,7 @@ use meshes::{Meshes, ReadMesh};
 use notices::Notices;
 use std::collections::HashSet;
 use std::path::Path;
+use tree::{LinkPlace, Tree};
 
 /// Result of reading an MJCF.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,10 +4,10 @@
 //! kept, except invisible characters, which become character references ([`dynident_text::xml::document`]). A body
 //! fixed to a moving body gets a massless `<inertial>`, because otherwise MuJoCo computes its mass from its geoms.
 
-use super::bodies::LinkPlace;
 use super::compiler::FromGeoms;
 use super::expanded::{Expanded, Include, Place};
 use super::fault::MjcfError;
+use super::tree::LinkPlace;
 use super::{Found, read};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};

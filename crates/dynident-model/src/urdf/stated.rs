@@ -93,7 +93,7 @@ pub fn rewrite_inertials(
             return Err(UrdfWriteError::NotFinite { kind: "link", name: new.link.clone() });
         }
         let mut change =
-            |element: &str, attribute: &str, word: usize, (old, new): (f64, f64)| -> Result<(), UrdfWriteError> {
+            |element: &str, attribute: &str, word: usize, old: f64, new: f64| -> Result<(), UrdfWriteError> {
                 if old == new {
                     return Ok(());
                 }
@@ -108,12 +108,12 @@ pub fn rewrite_inertials(
                 edits.push((place, text));
                 Ok(())
             };
-        change("mass", "value", 0, (old.mass_kg, new.mass_kg))?;
+        change("mass", "value", 0, old.mass_kg, new.mass_kg)?;
         for axis in 0..3 {
-            change("origin", "xyz", axis, (old.com_m[axis], new.com_m[axis]))?;
+            change("origin", "xyz", axis, old.com_m[axis], new.com_m[axis])?;
         }
         for (moment, name) in MOMENT_NAMES.into_iter().enumerate() {
-            change("inertia", name, 0, (old.moments[moment], new.moments[moment]))?;
+            change("inertia", name, 0, old.moments[moment], new.moments[moment])?;
         }
     }
     Ok(edited(original, edits))

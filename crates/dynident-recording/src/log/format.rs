@@ -320,6 +320,31 @@ impl LogFormat {
         Self { time: None, rate_hz: Some(rate_hz), ..Self::with_time(time, position, torque) }
     }
 
+    /// Checks the keys of the clock.
+    fn validate_clock(&self) -> Result<(), FormatError> {
+        let wrong = |key: &str, problem: &str, fix: &str| Err(FormatError::new(key, problem, fix));
+        match (&self.time, self.rate_hz) {
+            (None, None) => {
+                let fix = "write time = { column = \"t_s\" } or rate_hz = 1000.0";
+                wrong("time", "neither time nor rate_hz is given", fix)
+            }
+            (Some(_), Some(_)) => wrong("rate_hz", "time and rate_hz are both given", "keep one of them"),
+            (None, Some(rate)) if !(rate.is_finite() && rate > 0.0 && rate <= 1e7) => {
+                let fix = "give samples per second, above 0 and at most 1e7";
+                wrong("rate_hz", &format!("{rate} is not a valid rate"), fix)
+            }
+            (Some(time), None) if time.max_difference_s.is_nan() || time.max_difference_s <= 0.0 => {
+                let problem = format!("{:?} is not positive", time.max_difference_s);
+                wrong("time.max_difference_s", &problem, "give a number of seconds, such as 0.1")
+            }
+            (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
+                let problem = format!("{:?} is no length of a tick", time.scale);
+                wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out")
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Checks the format, including its agreement with the study's joints.
     ///
     /// # Errors
@@ -329,26 +354,7 @@ impl LogFormat {
         if joints.is_empty() {
             return wrong("position", "the study contains no joints", "list at least one joint");
         }
-        match (&self.time, self.rate_hz) {
-            (None, None) => {
-                let fix = "write time = { column = \"t_s\" } or rate_hz = 1000.0";
-                return wrong("time", "neither time nor rate_hz is given", fix);
-            }
-            (Some(_), Some(_)) => return wrong("rate_hz", "time and rate_hz are both given", "keep one of them"),
-            (None, Some(rate)) if !(rate.is_finite() && rate > 0.0 && rate <= 1e7) => {
-                let fix = "give samples per second, above 0 and at most 1e7";
-                return wrong("rate_hz", &format!("{rate} is not a valid rate"), fix);
-            }
-            (Some(time), None) if time.max_difference_s.is_nan() || time.max_difference_s <= 0.0 => {
-                let problem = format!("{:?} is not positive", time.max_difference_s);
-                return wrong("time.max_difference_s", &problem, "give a number of seconds, such as 0.1");
-            }
-            (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
-                let problem = format!("{:?} is no length of a tick", time.scale);
-                return wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out");
-            }
-            _ => {}
-        }
+        self.validate_clock()?;
         if let Some(delimiter) = self.delimiter
             && !matches!(delimiter, ',' | ';' | '\t' | ' ' | '|' | ':')
         {

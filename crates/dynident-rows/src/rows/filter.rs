@@ -68,6 +68,11 @@ impl ParallelFilterSettings {
         1.75 * motion_cutoff_hz
     }
 
+    /// Half-gain frequency of the filter with the default number of rows for this cut-off of the motion.
+    pub fn half_gain_hz(motion_cutoff_hz: f64) -> f64 {
+        0.7 * motion_cutoff_hz
+    }
+
     /// Decimation at this rate for a motion below `motion_cutoff_hz`; `None` if every sample is a row.
     pub fn decimation(&self, rate_hz: f64, motion_cutoff_hz: Option<f64>) -> Option<DecimationSettings> {
         if !self.enabled {

@@ -60,7 +60,7 @@ pub fn noise_factors(
     let differentiator = settings.build_following(report.cutoff.cutoff_hz, None).map_err(in_filter)?;
     let repeats = (NOISE_SAMPLES / samples.max(1)).clamp(1, MAX_REPEATS);
     let mut random = Random::new(SEED);
-    let noise = |_| Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples));
+    let noise = |_| Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, rate_hz, read, samples);
     let noise: Vec<Noise> = (0..repeats).map(noise).collect::<Result<_, _>>().map_err(in_filter)?;
     // The panels with and without noise have the same samples in the same order.
     let rows = |block: &(dyn Fn(usize, &MotionBlock, usize) -> MotionBlock + Sync)| -> Result<JointPanels, LogError> {
@@ -105,7 +105,9 @@ impl Noise {
         differentiator: &dyn Differentiator,
         random: &mut Random,
         position_noise: &[f64],
-        (rate_hz, read, length): (f64, usize, usize),
+        rate_hz: f64,
+        read: usize,
+        length: usize,
     ) -> Result<Self, dynident_recording::FilterError> {
         // A differentiator that uses all samples needs a noise sequence as long as the log.
         let (whole, margin) = match differentiator.context_samples(rate_hz) {

@@ -9,9 +9,11 @@ use dynident_excitation::families::FamilyError;
 use dynident_excitation::limits::LimitError;
 use dynident_excitation::optimisers::OptimiserError;
 use dynident_excitation::step_wise::StepWiseError;
+use dynident_identification::diagnosis::InvalidLimit;
 use dynident_identification::estimators::PeriodError;
 use dynident_identification::payload::PayloadError;
 use dynident_identification::rows::ParallelFilterError;
+use dynident_identification::{EventSettingsError, ThresholdError};
 use dynident_iteration::IterationError;
 use dynident_model::terms::{ExpressionError, TorqueTableError};
 use dynident_model::{LoopError, ModelError};
@@ -286,6 +288,15 @@ pub enum StudyError {
     /// Invalid settings of a simulated robot, a controller or a reference.
     #[error("{0}")]
     Simulation(#[from] SimulationError),
+    /// An invalid threshold.
+    #[error("{0}")]
+    Threshold(#[from] ThresholdError),
+    /// An invalid threshold of the search for events.
+    #[error("{0}")]
+    Events(#[from] EventSettingsError),
+    /// An invalid limit of `check`.
+    #[error("{0}")]
+    Limit(#[from] InvalidLimit),
     /// Invalid settings of an iteration.
     #[error("{0}")]
     Iteration(#[source] Box<IterationError>),

@@ -236,7 +236,7 @@ impl IterationSection {
             DifferentiatorKey::Stated(stated) => (stated.clone(), false),
         };
         differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
-        let IdentificationSettings { mut estimation, consistency, friction, offsets, .. } = identification;
+        let IdentificationSettings { mut estimation, consistency, friction, offsets, thresholds, .. } = identification;
         let run_offsets = match offsets {
             OffsetChoice::Shared => RunOffsets::WhereSeen,
             OffsetChoice::PerLog => RunOffsets::PerRun,
@@ -273,6 +273,7 @@ impl IterationSection {
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
                 run_offsets,
+                thresholds,
             },
             start: self.start.unwrap_or_default(),
             first: self.first.clone(),

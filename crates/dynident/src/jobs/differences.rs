@@ -6,9 +6,6 @@ use dynident_identification::changes::Differences;
 use dynident_identification::{DescriptionThresholds, Identification};
 use dynident_model::Model;
 
-/// Probability below which an explanation is omitted.
-const MIN_LISTED_PROBABILITY: f64 = 0.01;
-
 /// The explanations, most probable first. All explanations in which every body differs are merged.
 pub(in crate::jobs) fn explanations_of(
     found: &Differences,
@@ -31,7 +28,7 @@ pub(in crate::jobs) fn explanations_of(
         ..ChangeExplanation::default()
     };
     let mut all: Vec<ChangeExplanation> = sets.chain([everything]).collect();
-    all.retain(|own| own.probability >= MIN_LISTED_PROBABILITY);
+    all.retain(|own| own.probability >= limits.min_listed_probability);
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     all
 }

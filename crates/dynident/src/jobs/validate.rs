@@ -36,7 +36,7 @@ pub fn validate_result(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
-    Ok(validated(stored, result_path, (study, study_path), options, false)?.0)
+    Ok(validated(stored, result_path, study, study_path, options, false)?.0)
 }
 
 /// Torque over time of the logs that [`validate_result()`] uses: measured, and predicted by the exported model.
@@ -50,13 +50,14 @@ pub fn validation_traces(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<Vec<LogTrace>, Error> {
-    Ok(validated(stored, result_path, (study, study_path), options, true)?.1)
+    Ok(validated(stored, result_path, study, study_path, options, true)?.1)
 }
 
 fn validated(
     stored: &ResultFile,
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     options: &RunOptions<'_>,
     traced: bool,
 ) -> Result<(ValidationFile, Vec<LogTrace>), Error> {

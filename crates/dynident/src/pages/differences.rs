@@ -3,29 +3,21 @@
 use crate::result::{ChangeExplanation, ChangedPart, DescriptionComparison, ResultFile};
 use dynident_report::short;
 
-/// Minimum probability with which an explanation by single bodies is reported as a possibility.
-const MIN_REPORTED_PROBABILITY: f64 = 0.5;
-
-/// Minimum probability with which it is reported as a fact, with the edit test.
-const MIN_CERTAIN_PROBABILITY: f64 = 0.95;
-
-/// Minimum probability with which an alternative explanation is listed.
-const MIN_ALTERNATIVE_PROBABILITY: f64 = 0.1;
-
 /// If one or two bodies differ from the robot description: one sentence for each fact (which body, by how much, how
 /// certain, the alternatives, and the edit test). Empty if nothing or everything differs.
 pub fn difference_words(r: &ResultFile) -> Vec<String> {
     let Some(found) = &r.description_differences else { return Vec::new() };
+    let limits = &r.thresholds.differences;
     let Some(best) = found.explanations.first() else { return Vec::new() };
     let few: f64 = found.explanations.iter().filter(|own| !own.parts.is_empty()).map(|own| own.probability).sum();
-    if best.parts.is_empty() || few < MIN_REPORTED_PROBABILITY {
+    if best.parts.is_empty() || few < limits.min_reported_probability {
         return Vec::new();
     }
-    let is_certain = best.probability >= MIN_CERTAIN_PROBABILITY;
+    let is_certain = best.probability >= limits.min_certain_probability;
     let changes: Vec<String> = best.parts.iter().map(change).collect();
     let perhaps = if is_certain { "" } else { "perhaps " };
     let mut words = vec![format!("{perhaps}{} (probability {:.0} %)", changes.join("; "), 100.0 * best.probability)];
-    let is_listed = |own: &&ChangeExplanation| own.probability >= MIN_ALTERNATIVE_PROBABILITY;
+    let is_listed = |own: &&ChangeExplanation| own.probability >= limits.min_alternative_probability;
     let others: Vec<String> = found.explanations.iter().skip(1).filter(is_listed).map(alternative).collect();
     if !others.is_empty() {
         words.push(format!("It could also be: {}", others.join("; or ")));

@@ -9,6 +9,7 @@ mod events;
 pub(crate) mod figures;
 mod forms;
 pub(crate) mod identification;
+mod identification_parameters;
 pub(crate) mod iteration;
 mod iteration_parameters;
 mod iteration_remarks;

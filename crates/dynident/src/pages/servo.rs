@@ -2,7 +2,7 @@
 
 use super::robot::{RobotAppearance, ellipsoid};
 use crate::error::Error;
-use crate::result::{ServoFile, ServoLog, ServoMotion, ServoNumber};
+use crate::result::{ServoDrive, ServoFile, ServoLog, ServoMotion, ServoNumber};
 use dynident_model::Model;
 use dynident_report::{Cell, Heading, LinePlot, Report, SceneMotion, Table, Text, Tone, short};
 
@@ -35,8 +35,8 @@ pub(crate) fn servo_page(
     scene.motions = motions.iter().take(MOST_PLAYED).map(played).collect();
     page.add(scene);
     page.add(Heading::new("Drives"));
-    let drives = file.joints.iter().zip(file.drives.iter().map(|drive| &drive.values));
-    page.add(numbers("joint", drives));
+    let drives: Vec<Vec<ServoNumber>> = file.drives.iter().map(ServoDrive::shown_values).collect();
+    page.add(numbers("joint", file.joints.iter().zip(&drives)));
     page.add(Heading::new("Bodies"));
     page.add(numbers("body", file.bodies.iter().map(|body| (&body.body, &body.values))));
     if let Some(log) = motions.first() {

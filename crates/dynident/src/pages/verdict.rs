@@ -14,7 +14,7 @@ const MAX_LOGS: usize = 3;
 /// Text that answers three questions: is the model good and for what, what is poorly determined, and what should be
 /// done next.
 pub(super) fn verdict(r: &ResultFile) -> Text {
-    let settings = TorqueErrorSettings::default();
+    let settings = &r.thresholds.errors;
     let mut text = Text::new(headline(r));
     let problems = r.problem_lines();
     let is_usable = problems.is_empty() && r.physical.consistent;
@@ -26,7 +26,7 @@ pub(super) fn verdict(r: &ResultFile) -> Text {
     }
     if is_usable {
         let error = r.validation.first().and_then(|log| log.exported().relative_error_percent);
-        let (tone, condition) = match error.map(|error| rating(error, &settings)) {
+        let (tone, condition) = match error.map(|error| rating(error, settings)) {
             Some(Tone::Good) => (Tone::Good, ""),
             Some(_) => (Tone::Warning, " if this error is small enough for you"),
             None => (Tone::Plain, ""),
@@ -39,15 +39,15 @@ pub(super) fn verdict(r: &ResultFile) -> Text {
             ),
         );
     }
-    let weak = r.weak_joints(&settings);
+    let weak = r.weak_joints();
     if !weak.is_empty() {
         let words = joint_error_words(&weak, &str::to_owned);
         text = text.point(Tone::Warning, format!("Much worse at single joints: {words}."));
     }
-    let formats = formats(r, &settings);
+    let formats = formats(r);
     let worse: Vec<&FormatError> = formats.iter().filter(|format| format.is_worse).collect();
     if !worse.is_empty() {
-        let is_bad = rating(worse[0].relative_error_percent, &settings) == Tone::Bad;
+        let is_bad = rating(worse[0].relative_error_percent, settings) == Tone::Bad;
         let tone = if is_bad { Tone::Bad } else { Tone::Warning };
         let words = format_error_words(&worse);
         text = text.point(tone, format!("Exported files that lack some friction or drive terms are worse: {words}."));
@@ -126,8 +126,8 @@ fn next_step(r: &ResultFile, is_usable: bool) -> String {
 }
 
 /// Errors of the export formats on the first held-out log.
-fn formats(r: &ResultFile, settings: &TorqueErrorSettings) -> Vec<FormatError> {
-    r.validation.first().map_or_else(Vec::new, |log| r.format_errors(log, settings))
+fn formats(r: &ResultFile) -> Vec<FormatError> {
+    r.validation.first().map_or_else(Vec::new, |log| r.format_errors(log))
 }
 
 pub(super) fn percent(value: Option<f64>) -> String {
@@ -145,11 +145,11 @@ fn rating(percent: f64, settings: &TorqueErrorSettings) -> Tone {
 
 /// Key figures: errors, the worst joint, export formats, and what is known of the parameters, each with a rating.
 pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
-    let settings = TorqueErrorSettings::default();
+    let settings = &r.thresholds.errors;
     // A green mark next to a problem would be misleading.
     let is_good = r.problems.is_empty() && r.method.is_settled();
     let careful = |tone: Tone| if tone == Tone::Good && !is_good { Tone::Plain } else { tone };
-    let rated = |percent: Option<f64>| careful(percent.map_or(Tone::Plain, |percent| rating(percent, &settings)));
+    let rated = |percent: Option<f64>| careful(percent.map_or(Tone::Plain, |percent| rating(percent, settings)));
     let mut figures = KeyFigures::new();
     for log in r.validation.iter().take(MAX_LOGS) {
         let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
@@ -160,12 +160,12 @@ pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
     if r.validation.is_empty() {
         figures = figures.judged("held-out torque error", "–", "no held-out log", Tone::Warning);
     }
-    let is_weak = |joint: &JointError| r.weak_joints(&settings).iter().any(|weak| weak.name == joint.name);
-    let worst = r.validation.first().and_then(|log| r.joint_errors(log, &settings).into_iter().next());
+    let is_weak = |joint: &JointError| r.weak_joints().iter().any(|weak| weak.name == joint.name);
+    let worst = r.validation.first().and_then(|log| r.joint_errors(log).into_iter().next());
     if let Some(joint) = worst {
         let small = if joint.is_small { "; its torque is small" } else { "" };
         let note = format!("{}: {}\u{a0}{}{small}", joint.name, short(joint.rmse, 2), joint.unit);
-        let tone = match rating(joint.relative_error_percent, &settings) {
+        let tone = match rating(joint.relative_error_percent, settings) {
             Tone::Bad if joint.is_small => Tone::Warning,
             _ if !is_weak(&joint) => Tone::Good,
             tone => tone,
@@ -173,7 +173,7 @@ pub(super) fn key_figures(r: &ResultFile) -> KeyFigures {
         figures =
             figures.judged("worst joint, held out", percent(Some(joint.relative_error_percent)), note, careful(tone));
     }
-    let formats = formats(r, &settings);
+    let formats = formats(r);
     if let Some(worst) = formats.first() {
         let (value, note) =
             (percent(Some(worst.relative_error_percent)), format_error_words(&formats.iter().collect::<Vec<_>>()));

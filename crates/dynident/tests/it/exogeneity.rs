@@ -9,7 +9,7 @@ fn arm() -> std::path::PathBuf {
 }
 
 /// A slow motion of a two-link arm at 250 Hz; `noise` of the positions, rad.
-fn write(folder: &Path, name: &str, truth: &Truth, (seed, noise): (u64, f64)) {
+fn write(folder: &Path, name: &str, truth: &Truth, seed: u64, noise: f64) {
     let mut random = Random(seed);
     write_log(&folder.join(name), truth, &Motion::new(2, seed), (250.0, 30.0), &header(2), |q, tau| {
         let q: Vec<f64> = q.iter().map(|q| q + noise * random.normal()).collect();
@@ -47,8 +47,8 @@ const HIGH: &str = "motion.differentiator = { method = \"butterworth\", cutoff_h
 #[test]
 fn noise_of_the_positions_is_found_and_undone_without_asking() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), Truth::near(&arm(), 0.1, false));
-    write(folder.path(), "log.csv", &truth, (3, 1e-3));
-    write(folder.path(), "test.csv", &truth, (4, 1e-3));
+    write(folder.path(), "log.csv", &truth, 3, 1e-3);
+    write(folder.path(), "test.csv", &truth, 4, 1e-3);
     // The highest frequency of the motion is 0.65 Hz. White noise of 1 mrad below 15 Hz is about 5 rad/s² of
     // acceleration, several times that of the motion.
     let job = Job::new(folder.path(), &study(HIGH));
@@ -84,8 +84,8 @@ fn noise_of_the_positions_is_found_and_undone_without_asking() {
 #[test]
 fn a_clean_log_is_weighted_least_squares_and_nothing_is_said() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), Truth::near(&arm(), 0.1, false));
-    write(folder.path(), "log.csv", &truth, (3, 1e-6));
-    write(folder.path(), "test.csv", &truth, (4, 1e-6));
+    write(folder.path(), "log.csv", &truth, 3, 1e-6);
+    write(folder.path(), "test.csv", &truth, 4, 1e-6);
     for further in ["", HIGH] {
         let found = Job::new(folder.path(), &study(further)).identify();
         assert_eq!((&found.result.method.estimator[..], verdict(&found)), ("weighted", NoiseVerdict::Harmless));

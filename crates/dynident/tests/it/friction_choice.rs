@@ -26,11 +26,11 @@ const SEEDS: u64 = 10;
 /// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its additional friction near rest
 /// with a velocity of 0.08 rad/s.
 fn write_log(path: &Path, arm: &Path, rows: usize, moving: f64, stribeck: f64, seed: u64) {
-    write_loaded_log(path, arm, (rows, seed), moving, (stribeck, 0.0));
+    write_loaded_log(path, arm, rows, seed, moving, stribeck, 0.0);
 }
 
 /// The same with dry friction of the shoulder that increases by `load` per unit of gear load.
-fn write_loaded_log(path: &Path, arm: &Path, (rows, seed): (usize, u64), moving: f64, (stribeck, load): (f64, f64)) {
+fn write_loaded_log(path: &Path, arm: &Path, rows: usize, seed: u64, moving: f64, stribeck: f64, load: f64) {
     let model = load_robot(arm).unwrap().model;
     let (mut workspace, mut random) = (Workspace::new(&model), Random(seed));
     let mut text = "t,q1,q2,tau1,tau2\n".to_owned();
@@ -110,8 +110,8 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
 fn restricted_laws_are_obeyed_and_their_cost_is_stated() {
     let folder = tempfile::tempdir().unwrap();
     let arm = arm(folder.path());
-    write_loaded_log(&folder.path().join("a.csv"), &arm, (3000, 1), 1.0, (1.5, 0.3));
-    write_loaded_log(&folder.path().join("b.csv"), &arm, (1000, 2), 1.0, (1.5, 0.3));
+    write_loaded_log(&folder.path().join("a.csv"), &arm, 3000, 1, 1.0, 1.5, 0.3);
+    write_loaded_log(&folder.path().join("b.csv"), &arm, 1000, 2, 1.0, 1.5, 0.3);
     let free = job(folder.path(), "friction = \"auto\"").identify().result;
     assert!(free.friction_choice[0].chosen.contains("load"), "{:?}", free.friction_choice[0]);
     assert!(free.friction_choice.iter().all(|joint| joint.unrestricted.is_none()));
@@ -285,8 +285,8 @@ fn bars_hold_no_more_than_that_where_friction_depends_on_the_load() {
 fn bars_with_constants_chosen_before(load: f64) {
     let folder = tempfile::tempdir().unwrap();
     let arm = arm(folder.path());
-    write_loaded_log(&folder.path().join("a.csv"), &arm, (2000, 3), 1.0, (0.8, load));
-    write_loaded_log(&folder.path().join("b.csv"), &arm, (500, 99), 1.0, (0.8, load));
+    write_loaded_log(&folder.path().join("a.csv"), &arm, 2000, 3, 1.0, 0.8, load);
+    write_loaded_log(&folder.path().join("b.csv"), &arm, 500, 99, 1.0, 0.8, load);
     let job = job(folder.path(), "");
     let robot = job.robot();
     let mut task = job.study.task(&job.path, &robot, &Folders::new(&job.study, &job.path, None)).unwrap();

@@ -62,6 +62,7 @@ mod simulated_loop;
 mod spoilt_logs;
 mod synthetic_truth;
 mod temperature;
+mod thresholds;
 mod torque_band;
 mod torque_lag;
 mod unstated_spring;

@@ -129,14 +129,14 @@ impl Spline {
         (sum.max(0.0), product)
     }
 
-    /// Adds `position · BᵀB + penalty · P` of one joint to the band, and `position · Bᵀ r − penalty · P c` to its
-    /// right-hand side.
-    pub(super) fn add_to(
+    /// Adds `position · BᵀB` of one joint to the band, and `position · Bᵀ r` to its right-hand side.
+    pub(super) fn add_positions(
         &self,
         matrix: &mut BandedArrow,
-        (joint, joints): (usize, usize),
-        (position, residual): (f64, &[f64]),
-        (penalty, gram, pulled): (f64, &[[f64; ACTIVE]; ACTIVE], &[f64]),
+        joint: usize,
+        joints: usize,
+        position: f64,
+        residual: &[f64],
     ) {
         let full = self.products(self.step);
         for interval in 0..self.functions() + 1 - ACTIVE {
@@ -155,7 +155,6 @@ impl Spline {
                 }
             }
         }
-        self.add_roughness(matrix, joint, joints, penalty, gram, pulled);
     }
 
     /// Adds `penalty · P` of one joint to the band, and `−penalty · P c` to its right-hand side.

@@ -12,16 +12,26 @@ use crate::nonlinear::simultaneous::estimate_without_motion;
 use crate::uncertainty::Estimate;
 use rayon::prelude::*;
 
+/// Last linearisation of the fit.
+pub(super) struct LastStep<'a> {
+    pub(super) pieces: &'a [Piece<'a>],
+    pub(super) noise: &'a [LogNoise],
+    pub(super) free: &'a FreeParameters,
+    pub(super) coefficients: &'a [Vec<f64>],
+    pub(super) parameters: &'a [f64],
+    pub(super) iterations: usize,
+    pub(super) converged: bool,
+}
+
 /// Estimate from the last linearisation: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, positions and motion prior;
 /// their normal matrix is the Schur complement.
 pub(super) fn estimate_of<M: TorqueModel>(
     problem: &SplineMotionProblem,
     settings: &SplineMotionSettings,
     model: &mut M,
-    (pieces, noise, free): (&[Piece<'_>], &[LogNoise], &FreeParameters),
-    (coefficients, parameters): (&[Vec<f64>], &[f64]),
-    (iterations, converged): (usize, bool),
+    last: &LastStep<'_>,
 ) -> Result<Estimate, M::Error> {
+    let LastStep { pieces, noise, free, coefficients, parameters, iterations, converged } = *last;
     let information = pieces
         .iter()
         .zip(coefficients)

@@ -1,7 +1,7 @@
 //! Motion and parameters of any log from one likelihood, with a smoothing spline as motion.
 
 use super::bspline::Spline;
-use super::covariance::estimate_of;
+use super::covariance::{LastStep, estimate_of};
 use super::noise::LogNoise;
 use super::problem::{
     SplineJointFit, SplineLogFit, SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings, SplineRecord,
@@ -121,9 +121,15 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         problem,
         settings,
         model,
-        (&pieces, &noise, &free),
-        (&state.coefficients, &state.parameters),
-        (iterations, converged),
+        &LastStep {
+            pieces: &pieces,
+            noise: &noise,
+            free: &free,
+            coefficients: &state.coefficients,
+            parameters: &state.parameters,
+            iterations,
+            converged,
+        },
     )?;
     let motion = pieces.iter().zip(&state.coefficients).map(|(piece, own)| piece.motion(own, 0, piece.samples()));
     Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })

@@ -93,11 +93,12 @@ impl Rough {
         let (count, gram) = (spline.functions(), spline.roughness(3));
         let least = unit(&spline, &gram) * 10.0_f64.powi(RATIO_DECADES.0);
         let mut matrix = BandedArrow::new(count, ACTIVE - 1, 0);
-        spline.add_to(&mut matrix, (0, 1), (1.0, &moved), (least, &gram, &[]));
+        spline.add_positions(&mut matrix, 0, 1, 1.0, &moved);
+        spline.add_roughness(&mut matrix, 0, 1, least, &gram, &[]);
         let coefficients = matrix.eliminated().ok()?.band_solution(&[]);
         let left = spline.residual(&coefficients, 0, 1, &moved);
         let mut normal = BandedArrow::new(count, ACTIVE - 1, 0);
-        spline.add_to(&mut normal, (0, 1), (1.0, &left), (0.0, &gram, &[]));
+        spline.add_positions(&mut normal, 0, 1, 1.0, &left);
         let right = normal.right().to_vec();
         let squares = left.iter().map(|x| x * x).sum();
         Some(Self { spline, samples: q.len(), offset, coefficients, normal, right, squares })

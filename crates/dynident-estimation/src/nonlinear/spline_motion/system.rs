@@ -82,12 +82,13 @@ impl System {
             let mut matrix = torque.matrix.clone();
             let own = &noise[piece.record.log];
             for (joint, smoothness) in own.positions.iter().enumerate() {
-                let (joints, spline) = ((joint, piece.joints), &piece.spline);
+                let (joints, spline) = (piece.joints, &piece.spline);
                 let gram = spline.roughness(smoothness.order);
-                let left = spline.residual(coefficients, joints.0, joints.1, piece.q(joint));
-                let (_, pulled) = spline.penalty(&gram, coefficients, joints.0, joints.1);
+                let left = spline.residual(coefficients, joint, joints, piece.q(joint));
+                let (_, pulled) = spline.penalty(&gram, coefficients, joint, joints);
                 let position = smoothness.position_std.powi(-2);
-                spline.add_to(&mut matrix, joints, (position, &left), (smoothness.penalty, &gram, &pulled));
+                spline.add_positions(&mut matrix, joint, joints, position, &left);
+                spline.add_roughness(&mut matrix, joint, joints, smoothness.penalty, &gram, &pulled);
             }
             matrix.eliminated().map_err(|unknown| EstimationError::Undetermined {
                 name: format!("unknown {} of the motion", unknown + 1),

@@ -120,14 +120,7 @@ impl LimitsInForce {
             ));
         }
         given.scale.validate()?;
-        if !given.scale.is_one() {
-            under.scale_joints(given.scale);
-            let scale = given.scale;
-            assumed.push(format!(
-                "limits of the robot description and assumed accelerations are multiplied by {} (speed), {} (acceleration), {} (torque) (limits.scale)",
-                scale.speed, scale.acceleration, scale.torque
-            ));
-        }
+        assumed.extend(scaled(&mut under, given));
         let clearance_m = settings.thresholds.clearance_share * arm_length_m(model);
         if settings.floor {
             let over = given.floor.as_ref();
@@ -166,6 +159,18 @@ impl LimitsInForce {
         );
         Ok(Self { limits, assumed, not_checked })
     }
+}
+
+/// Multiplies limits by the scale of `given`, and states it; `None` for a scale of one.
+fn scaled(under: &mut Limits, given: &Limits) -> Option<String> {
+    let scale = given.scale;
+    (!scale.is_one()).then(|| {
+        under.scale_joints(scale);
+        format!(
+            "limits of the robot description and assumed accelerations are multiplied by {} (speed), {} (acceleration), {} (torque) (limits.scale)",
+            scale.speed, scale.acceleration, scale.torque
+        )
+    })
 }
 
 fn assumed_self_collision(

@@ -142,6 +142,10 @@ pub(super) trait MistakeKind {
         self.with_number(1.0)
     }
 
+    fn nearest_unit(&self) -> Option<Mistake> {
+        None
+    }
+
     /// The mistake in other channels (position or torque), if possible.
     fn with_channels(&self, _channels: Channels) -> Option<Mistake> {
         None

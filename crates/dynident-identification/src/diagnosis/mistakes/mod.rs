@@ -134,6 +134,11 @@ impl Mistake {
         self.kind().with_best_number(&value)
     }
 
+    /// The mistake with the exact unit nearest to its number; `None` if no unit is near.
+    pub(super) fn nearest_unit(&self) -> Option<Self> {
+        self.kind().nearest_unit()
+    }
+
     pub(super) fn torques_alone(&self) -> Option<Vec<TorqueSource>> {
         let Facts { channels, torques, .. } = self.facts();
         (channels == Some(Channels::Torque) && !torques.is_empty()).then_some(torques)

@@ -3,11 +3,16 @@
 /// Number of grid points before refinement. There are several because the residual has local minima between gear
 /// ratios.
 const GRID_POINTS: usize = 17;
+/// Maximum ratio between the ends of a range of factors that is reported as a single factor.
+pub(super) const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
+/// Minimum logarithm of the ratio between a free factor and a unit; a free factor that is nearer does not replace the
+/// unit.
+pub(super) const MIN_LOG_RATIO_TO_UNIT: f64 = 0.1;
 
 /// Free number of a mistake, with its search range.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) struct Number {
-    pub(super) at: f64,
+    pub(in crate::diagnosis) at: f64,
     /// Half-width of the search range; for a factor, half-width of its logarithm.
     pub(in crate::diagnosis) reach: f64,
     pub(super) is_factor: bool,

@@ -2,7 +2,7 @@
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, joint_list, scale};
-use super::numbers::Number;
+use super::numbers::{MAX_RATIO_OF_ONE_FACTOR, MIN_LOG_RATIO_TO_UNIT, Number};
 use super::study_keys::{KeyChange, StudyKeys, significant};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
@@ -23,11 +23,6 @@ const EXACT_UNITS: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 0.5, 
 const MAX_TRAVEL_RANGES: f64 = 2.0;
 /// Half-width of the search for gear ratios and encoder counts, as the logarithm of the factor.
 const SEARCH_REACH: f64 = 2.0;
-/// Maximum ratio between the ends of a range of factors that is reported as a single factor.
-const MAX_RATIO_OF_ONE_FACTOR: f64 = 1.1;
-/// Minimum logarithm of the ratio between a free factor and a unit; a free factor that is nearer does not replace the
-/// unit.
-const MIN_LOG_RATIO_TO_UNIT: f64 = 0.1;
 
 /// The positions of these joints are in another unit, or were measured on the motor side of the gear.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, scale};
-use super::numbers::Number;
+use super::numbers::{MAX_RATIO_OF_ONE_FACTOR, Number};
 use super::study_keys::{KeyChange, StudyKeys, significant};
 use crate::diagnosis::motion_rows::MotionRows;
 use crate::diagnosis::plausibility::{beyond_limits, is_rate_of_a_recorder};
@@ -11,8 +11,11 @@ use dynident_recording::log::TimeUnit as LogUnit;
 
 /// Units of time to try.
 const UNITS: [f64; 8] = [1e-3, 1e-6, 1e-9, 1e-2, 1e3, 1e6, 1e9, 1e2];
-/// Factors on the sample rate to try: every second sample, a decimal place, minutes.
-const OTHER_RATES: [f64; 5] = [0.5, 2.0, 0.1, 10.0, 60.0];
+/// Factors on the sample rate to try: every second sample, a decimal place, minutes. The search ranges of neighbours
+/// overlap.
+const OTHER_RATES: [f64; 7] = [0.5, 2.0, 0.25, 4.0, 0.1, 10.0, 60.0];
+/// Half-width of the search range, as the logarithm of the factor.
+const REACH: f64 = 0.5;
 
 /// The time stamps have another unit, or the recorder has another rate.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +50,7 @@ impl MistakeKind for TimeUnit {
 
     fn facts(&self) -> Facts {
         let is_other_rate = !UNITS.contains(&self.factor);
-        let factor = Number { is_round: true, ..Number::factor(self.factor, 0.4) };
+        let factor = Number { is_round: true, ..Number::factor(self.factor, REACH) };
         Facts { is_other_rate, number: is_other_rate.then_some(factor), ..Facts::of("unit") }
     }
 
@@ -58,6 +61,16 @@ impl MistakeKind for TimeUnit {
             return format!("time is in another unit: multiply it by {factor:e} to get seconds");
         }
         format!("the recorder had another rate: multiply the time stamps by {factor:.3} to get seconds")
+    }
+
+    fn other_factors(&self, [least, greatest]: [f64; 2]) -> String {
+        if !self.facts().is_other_rate || greatest <= MAX_RATIO_OF_ONE_FACTOR * least {
+            return String::new();
+        }
+        let [least, greatest] = [least, greatest].map(significant);
+        format!(
+            "; these logs do not distinguish factors between {least} and {greatest}: use the rate of the recorder in this range"
+        )
     }
 
     fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {

@@ -2,8 +2,8 @@
 
 use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, TorqueSource, scale};
-use super::numbers::Number;
-use super::study_keys::{KeyChange, StudyKeys};
+use super::numbers::{MIN_LOG_RATIO_TO_UNIT, Number};
+use super::study_keys::{KeyChange, StudyKeys, significant};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
 use crate::diagnosis::span::dot;
@@ -68,7 +68,8 @@ impl MistakeKind for TorqueUnit {
             );
         }
         format!(
-            "the torque of joint `{name}` has a different unit, or is on the motor side: multiply it by {factor:.3} to get Nm (N)"
+            "the torque of joint `{name}` has a different unit, or is on the motor side: multiply it by {} to get Nm (N)",
+            significant(factor)
         )
     }
 
@@ -78,5 +79,10 @@ impl MistakeKind for TorqueUnit {
 
     fn with_number(&self, factor: f64) -> Option<Mistake> {
         Some(Self { factor, ..*self }.into())
+    }
+
+    fn nearest_unit(&self) -> Option<Mistake> {
+        let is_near = |unit: &f64| *unit != self.factor && (self.factor / unit).ln().abs() < MIN_LOG_RATIO_TO_UNIT;
+        self.with_number(EXACT_UNITS.into_iter().find(is_near)?)
     }
 }

@@ -1,7 +1,7 @@
 //! Converts a diagnosis to findings.
 
 use super::CheckSettings;
-use super::changes::{changes, keys_of_log, keys_of_study};
+use super::changes::{changes_of_log, keys_of_log, keys_of_study, successive_changes};
 use super::description::{another_robot, torque_unit, wrong_mass};
 use super::torques::{
     are_most_joints_unexplained, mostly_unexplained, torque_of_description, unexplained, unrelated_torques,
@@ -103,17 +103,21 @@ impl FindingContext<'_> {
     /// from it.
     fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
         let Self { joints, keys, .. } = self;
-        let one = |(number, mistake): (usize, &Mistake)| {
+        let (mut writes, before_last) = successive_changes(&best.mistakes, keys);
+        let last = best.mistakes.last().zip(best.factors_alike);
+        if last.is_some_and(|(mistake, range)| !mistake.other_factors(range).is_empty()) {
+            writes.last_mut().into_iter().flatten().for_each(|change| change.line += "   # one of the range above");
+        }
+        let one = |(mistake, write): (&Mistake, Vec<StudyChange>)| {
             let evidence = evidence(mistake, &search.as_written, best, joints);
-            let mut found = finding(mistake.key(), mistake.sentence(joints), evidence);
-            found.write = changes(mistake, keys);
-            if number + 1 == best.mistakes.len() {
-                let others = search.alike.iter().filter_map(|other| other.mistakes.last());
-                found.or = others.map(|other| alternative(other, joints, keys)).collect();
-            }
-            found
+            CheckFinding { write, ..finding(mistake.key(), mistake.sentence(joints), evidence) }
         };
-        best.mistakes.iter().enumerate().map(one).collect()
+        let mut all: Vec<CheckFinding> = best.mistakes.iter().zip(writes).map(one).collect();
+        let others = search.alike.iter().filter_map(|other| other.mistakes.last());
+        if let Some(last) = all.last_mut() {
+            last.or = others.map(|other| alternative(other, joints, before_last.as_ref())).collect();
+        }
+        all
     }
 
     /// Finding for the description of a different robot. The best hypothesis is mentioned only as an alternative,
@@ -215,7 +219,7 @@ fn of_held_out_log(
             "rms residual with the parameters of the training logs: {left_as_written:.3} Nm as written, {left_without:.3} Nm with the correction; the training logs do not have this mistake"
         ),
     );
-    found.write = changes(mistake, Some(&keys));
+    found.write = changes_of_log(mistake, study, &keys, *log);
     found.or = alike.iter().map(|other| alternative(other, joints, Some(&keys))).collect();
     found
 }

@@ -44,27 +44,6 @@ pub(in crate::jobs) struct Family {
 }
 
 impl Family {
-    /// Creates a family with a single column.
-    fn of_column(
-        file: usize,
-        group: usize,
-        (quantity, source, basis): (Quantity, Source, Basis),
-        (unit, stem, column): (Option<&'static str>, String, (JointKey, String)),
-    ) -> Self {
-        Self {
-            file,
-            group,
-            quantity,
-            source,
-            unit,
-            other_units: Vec::new(),
-            basis,
-            in_message_order: false,
-            stem,
-            columns: vec![column],
-        }
-    }
-
     /// The unit in the name of the column `column` of the family.
     pub(in crate::jobs) fn unit_of(&self, column: &str) -> Option<&'static str> {
         self.other_units.iter().find(|(name, _)| name == column).map_or(self.unit, |(_, unit)| *unit)
@@ -117,8 +96,10 @@ pub(in crate::jobs) fn families<'a>(
             let basis = if bare { Basis::FileName } else { Basis::ColumnNames };
             let in_message_order = is_message(contents, channel.group) && is_array_entry(&channel.name);
             let column = (joint, channel.name.clone());
-            let family = Family::of_column(file, channel.group, (quantity, source, basis), (unit, stem, column));
-            add(&mut found, Family { in_message_order, ..family });
+            let (group, other_units, columns) = (channel.group, Vec::new(), vec![column]);
+            let family =
+                Family { file, group, quantity, source, unit, other_units, basis, stem, in_message_order, columns };
+            add(&mut found, family);
         }
     }
     in_order_of_joints(&mut found);
@@ -174,9 +155,21 @@ pub(in crate::jobs) fn families_without_quantity<'a>(
             if matches!(joint, JointKey::Joint(_) | JointKey::Number(_)) {
                 let is_name = |joint: &String| joint.eq_ignore_ascii_case(&channel.name);
                 let basis = if joints.iter().any(is_name) { Basis::JointNames } else { Basis::Assumption };
-                let column = (joint, channel.name.clone());
-                let kind = (quantity, source, basis);
-                add(&mut found, Family::of_column(file, channel.group, kind, (unit, stem, column)));
+                add(
+                    &mut found,
+                    Family {
+                        file,
+                        group: channel.group,
+                        quantity,
+                        source,
+                        unit,
+                        other_units: Vec::new(),
+                        basis,
+                        in_message_order: false,
+                        stem,
+                        columns: vec![(joint, channel.name.clone())],
+                    },
+                );
             }
         }
     }

@@ -52,7 +52,7 @@ pub fn compare(results: &[(ResultFile, PathBuf)]) -> Result<ComparisonFile, Erro
         changes.extend(from_description(first, first_path, &common)?);
     }
     for (index, (result, path)) in results.iter().enumerate().skip(1) {
-        changes.push(between((first, first_path), (result, path, index), &common)?);
+        changes.push(between(first, first_path, result, path, index, &common)?);
     }
     Ok(ComparisonFile {
         schema: COMPARISON_SCHEMA.to_owned(),
@@ -217,8 +217,11 @@ fn known_rows<'a>(
 }
 
 fn between(
-    (first, first_path): (&ResultFile, &Path),
-    (result, path, index): (&ResultFile, &Path, usize),
+    first: &ResultFile,
+    first_path: &Path,
+    result: &ResultFile,
+    path: &Path,
+    index: usize,
     common: &[&str],
 ) -> Result<ChangesFrom, Error> {
     let robot = stored_robot(first, first_path)?;
@@ -227,9 +230,10 @@ fn between(
     let (model, names, rows) = known_rows(&robot, bodies, common).map_err(|error| failed(error.to_string()))?;
     let (old, old_covariance) = estimate(first, first_path, &names)?;
     let (new, new_covariance) = estimate(result, path, &names)?;
-    let found = Differences::between(&model, &rows, [(&old, &old_covariance), (&new, &new_covariance)]);
+    let limits = DescriptionThresholds::default();
+    let found = Differences::between(&model, &rows, [(&old, &old_covariance), (&new, &new_covariance)], &limits);
     let found = found.map_err(|error| failed(error.to_string()))?;
-    Ok(changes_of(&found, &model, (index, Some(0)), rows.len()))
+    Ok(changes_of(&found, &model, index, Some(0), rows.len()))
 }
 
 /// Changes of a result from its robot description; `None` if the description has no inertial values.
@@ -243,16 +247,17 @@ fn from_description(result: &ResultFile, path: &Path, common: &[&str]) -> Result
     let (model, names, rows) = known_rows(&robot, priors.into_iter().flatten().collect(), &described)
         .map_err(|error| failed(error.to_string()))?;
     let (values, covariance) = estimate(result, path, &names)?;
-    let knowledge = ConsistencySettings::default();
-    let found = Differences::from_description(&model, &rows, &values, &covariance, &knowledge);
+    let (knowledge, limits) = (ConsistencySettings::default(), DescriptionThresholds::default());
+    let found = Differences::from_description(&model, &rows, &values, &covariance, &knowledge, &limits);
     let found = found.map_err(|error| failed(error.to_string()))?;
-    Ok(found.map(|found| changes_of(&found, &model, (0, None), rows.len())))
+    Ok(found.map(|found| changes_of(&found, &model, 0, None, rows.len())))
 }
 
 fn changes_of(
     found: &Differences,
     model: &ParametricModel,
-    (result, from): (usize, Option<usize>),
+    result: usize,
+    from: Option<usize>,
     degrees_of_freedom: usize,
 ) -> ChangesFrom {
     let chi_squared = found.chi_squared();

@@ -57,7 +57,7 @@ pub fn check_trajectory(
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
     let check_rate_hz = setup.robot.model().characteristic_scale().round_hertz(CHECK_RATE_HZ);
-    let check = LimitCheck::of(&setup, study.path, (duration_s, check_rate_hz), SPLINE, &motion_at, NO_SEARCH)?;
+    let check = LimitCheck::of(&setup, study.path, duration_s, check_rate_hz, SPLINE, &motion_at, NO_SEARCH)?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
@@ -103,7 +103,7 @@ pub fn check_log(
     for piece in &pieces {
         let motion_at = |times: &[f64], out: &mut Motion| piece.motion(&[], times, out);
         check.append(
-            LimitCheck::of(&setup, study.path, (piece.duration_s(), rate_hz), SAMPLES, &motion_at, NO_SEARCH)?,
+            LimitCheck::of(&setup, study.path, piece.duration_s(), rate_hz, SAMPLES, &motion_at, NO_SEARCH)?,
             duration_s,
         );
         let part = setup.information(piece.times_s(), &motion_at);

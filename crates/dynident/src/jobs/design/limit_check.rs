@@ -34,7 +34,8 @@ impl LimitCheck {
     pub(super) fn of(
         setup: &DesignSetup,
         study_path: &Path,
-        (duration_s, rate_hz): (f64, f64),
+        duration_s: f64,
+        rate_hz: f64,
         of: &'static str,
         motion_at: &dyn Fn(&[f64], &mut Motion),
         (single, stop): SingleChanges<'_>,

@@ -83,9 +83,16 @@ pub fn design_study(
         Some(_) => Ok(Vec::new()),
         None => changes(&setup, study.path, &found, watch),
     };
-    let rates = (duration_s, check_rate_hz);
     let stop = || watch(&found.progress("check")).is_break();
-    let mut check = LimitCheck::of(&setup, study.path, rates, "the motion itself", &motion_at, (&single, &stop))?;
+    let mut check = LimitCheck::of(
+        &setup,
+        study.path,
+        duration_s,
+        check_rate_hz,
+        "the motion itself",
+        &motion_at,
+        (&single, &stop),
+    )?;
     check.diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);

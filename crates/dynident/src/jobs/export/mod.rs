@@ -5,7 +5,7 @@ mod simulator;
 mod validation;
 
 pub use servo::{ServoExport, ServoTarget, export_servos};
-pub use simulator::{export_simulator, export_simulator_of};
+pub use simulator::export_simulator;
 pub use validation::{
     EXPORT_VALIDATION_SUFFIX, export_validation, payload_validation, servo_validation, table_validation,
 };
@@ -259,19 +259,12 @@ fn with_velocities(stored: &ResultFile, robot: RobotModel) -> Result<RobotModel,
 }
 
 /// Exports a payload of a `result.json` as a command for the controller of manufacturer `reader`: the physically
-/// consistent body, in the frame of its link. `name` can be `None` if there is only one payload.
+/// consistent body, in the frame of its link. `name` can be `None` if there is only one payload; `result_path` is the
+/// name of the result in messages.
 ///
 /// # Errors
 /// A result without payloads or without this one, a payload without a physically consistent body.
-pub fn export_payload(result_path: &Path, name: Option<&str>, reader: ControllerBrand) -> Result<Exported, Error> {
-    export_payload_of(&ResultFile::read(result_path)?, result_path, name, reader)
-}
-
-/// Like [`export_payload()`] with a result in memory; `result_path` is its name in messages.
-///
-/// # Errors
-/// Same as for [`export_payload()`].
-pub fn export_payload_of(
+pub fn export_payload(
     stored: &ResultFile,
     result_path: &Path,
     name: Option<&str>,

@@ -11,24 +11,11 @@ use std::path::Path;
 /// Exports armature, damping, frictionloss, delay and actuator gain of every joint in the conventions of simulators,
 /// with error bars. Friction is the best approximation of the identified law over the recorded velocities. Error bars
 /// use the covariance of `result.json`. `study` is the study of the result; the robot file is also searched in the
-/// folder `data`.
+/// folder `data`. `result_path` is the name of the result in messages.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot.
 pub fn export_simulator(
-    result_path: &Path,
-    study: &Study,
-    study_path: &Path,
-    data: Option<&Path>,
-) -> Result<SimulatorFile, Error> {
-    export_simulator_of(&ResultFile::read(result_path)?, result_path, study, study_path, data)
-}
-
-/// Like [`export_simulator()`] with a result in memory; `result_path` is its name in messages.
-///
-/// # Errors
-/// Same as for [`export_simulator()`].
-pub fn export_simulator_of(
     stored: &ResultFile,
     result_path: &Path,
     study: &Study,

@@ -17,12 +17,12 @@ pub const EXPORT_VALIDATION_SUFFIX: &str = ".validation.json";
 /// Content of the validation file of an exported file: the held-out errors of the exported format and of the model on
 /// each log, the omitted terms, and the SHA-256 of `text`. `file` is the name of the exported file.
 pub fn export_validation(stored: &ResultFile, target: Target, file: &str, text: &str) -> ExportValidationFile {
-    of_class(stored, (target.name(), target.class()), file, text)
+    of_class(stored, target.name(), target.class(), file, text)
 }
 
 /// Like [`export_validation()`] for a D-H table, which can represent the same terms as URDF.
 pub fn table_validation(stored: &ResultFile, file: &str, text: &str) -> ExportValidationFile {
-    of_class(stored, ("dh", Target::Urdf.class()), file, text)
+    of_class(stored, "dh", Target::Urdf.class(), file, text)
 }
 
 /// Like [`export_validation()`] for a payload in the format with this name: the interval of each value.
@@ -45,16 +45,11 @@ pub fn servo_validation(
     file: &str,
     text: &str,
 ) -> ExportValidationFile {
-    let of_result = (stored.provenance.as_ref(), &stored.study[..], &stored.problems[..]);
-    ExportValidationFile { servo_forms: forms.to_vec(), ..without_errors(of_result, form, file, text) }
+    let empty = without_errors(stored.provenance.as_ref(), &stored.study, &stored.problems, form, file, text);
+    ExportValidationFile { servo_forms: forms.to_vec(), ..empty }
 }
 
-fn of_class(
-    stored: &ResultFile,
-    (name, class): (&str, Option<TermClass>),
-    file: &str,
-    text: &str,
-) -> ExportValidationFile {
+fn of_class(stored: &ResultFile, name: &str, class: Option<TermClass>, file: &str, text: &str) -> ExportValidationFile {
     let mut validation = empty(stored, name, file, text);
     match class.map(|class| stored.forms.iter().find(|form| form.class == class)) {
         // The format contains the complete model.
@@ -85,12 +80,14 @@ fn errors_of_model(stored: &ResultFile) -> Vec<FormError> {
 }
 
 fn empty(stored: &ResultFile, form: &str, file: &str, text: &str) -> ExportValidationFile {
-    without_errors((stored.provenance.as_ref(), &stored.name, &stored.problems), form, file, text)
+    without_errors(stored.provenance.as_ref(), &stored.name, &stored.problems, form, file, text)
 }
 
 /// Validation of an exported file with this provenance, name and problems, without errors.
 fn without_errors(
-    (provenance, name, problems): (Option<&Provenance>, &str, &[String]),
+    provenance: Option<&Provenance>,
+    name: &str,
+    problems: &[String],
     form: &str,
     file: &str,
     text: &str,

@@ -190,7 +190,7 @@ pub(in crate::jobs) fn build_outcome(
     let in_study = Error::identification::<IdentificationError>(study.path);
     let inertials = found.inertials();
     let verdict = physical_verdict(&study, &found, &inertials);
-    let (files, no_urdf) = match exported_model((&study, robot), task, &found, &verdict, is_payload) {
+    let (files, no_urdf) = match exported_model(&study, robot, task, &found, &verdict, is_payload) {
         Ok(files) => (Some(files.with_provenance(&provenance, &form_results(&found))), None),
         Err(reason) => (None, Some(reason)),
     };
@@ -270,7 +270,8 @@ fn physical_verdict(study: &Study, found: &Identification, inertials: &[Inertial
 
 /// A result remains valid if URDF cannot express its parameters.
 fn exported_model(
-    (study, robot): (&Study, &StudyRobot),
+    study: &Study,
+    robot: &StudyRobot,
     task: &IdentificationTask,
     found: &Identification,
     verdict: &PhysicalVerdict,
@@ -333,6 +334,7 @@ fn result_file(
         schema: RESULT_SCHEMA.to_owned(),
         name: parts.name,
         problems: Vec::new(),
+        thresholds: study.thresholds.report.clone(),
         provenance: Some(parts.provenance),
         robot: robot_summary(robot),
         method: method_summary(study, found),

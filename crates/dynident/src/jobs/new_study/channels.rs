@@ -3,6 +3,7 @@
 use super::grippers::is_gripper;
 use crate::jobs::columns::{Basis, Family, JointKey, is_quantity, words};
 use crate::result::LogContents;
+use dynident_model::{JointKind, Model};
 use std::path::Path;
 
 /// The joint of each column, and whether the assignment is certain.
@@ -27,7 +28,24 @@ pub(super) struct RobotJoints<'a> {
     pub(super) carriers: Vec<Vec<usize>>,
 }
 
-impl RobotJoints<'_> {
+impl<'a> RobotJoints<'a> {
+    /// The joints of a robot; `free` do not follow others.
+    pub(super) fn new(model: &Model, names: &'a [String], free: Vec<usize>) -> Self {
+        let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
+        let turning = free.iter().copied().filter(is_rotary).collect();
+        let moves = |other: usize, joint: usize| other != joint && model.moves(other, model.body_of(joint));
+        let carriers_of = |joint| (0..model.dof()).filter(|&other| moves(other, joint)).collect();
+        Self { names, free, turning, carriers: (0..model.dof()).map(carriers_of).collect() }
+    }
+
+    /// Whether `joint` carries one of the `logged` joints that is not among the places in `still`.
+    pub(super) fn carries_moving(&self, joint: usize, logged: &[usize], still: &[usize]) -> bool {
+        self.carriers.iter().enumerate().any(|(other, carriers)| {
+            let at = logged.iter().position(|logged| *logged == other);
+            carriers.contains(&joint) && at.is_some_and(|at| !still.contains(&at))
+        })
+    }
+
     /// Name of a joint that carries one of `joints` and is missing in the list although it moves independently.
     fn missing_below(&self, joints: &[usize]) -> Option<&str> {
         let mut below = joints.iter().filter_map(|joint| self.carriers.get(*joint)).flatten();

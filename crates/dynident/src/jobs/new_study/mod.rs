@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::jobs::check::check;
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
-use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, Unsure};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
 use crate::study::{LoadSettings, Study, XacroSettings, load_robot};
 use draft::{Draft, Table};
 use drives::{DriveInertiaFinding, drive_inertia};
@@ -115,32 +115,14 @@ pub fn new_study_with(
         draft.apply(change, "As stated");
     }
 
-    let mut examined = None;
     let mut unsure = draft.unsure();
     unsure.extend(recorded.unused_recordings(&logs));
     // No correction is reliable without the sample rate and the unit of the positions.
     let is_unknown = |change: &StudyChange| {
         change.line.starts_with("rate_hz") || may_be_normalised && change.line.starts_with("unit")
     };
-    if !unsure.iter().filter_map(|unsure| unsure.line.as_ref()).any(is_unknown) {
-        for _ in 0..MAX_ROUNDS {
-            let study = request.study(&draft)?;
-            let found = match check(&study, &request.out, options) {
-                Ok(found) => found.check,
-                Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // Except for the part that the error names, the study is known, so it is written.
-                Err(error) => {
-                    unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
-                    break;
-                }
-            };
-            let changed = draft.apply_corrections(&found);
-            examined = Some(found);
-            if !changed {
-                break;
-            }
-        }
-    }
+    let has_unknown = unsure.iter().filter_map(|unsure| unsure.line.as_ref()).any(is_unknown);
+    let examined = if has_unknown { None } else { corrected(request, options, &mut draft, &mut unsure)? };
     let remaining = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
     unsure.extend(remaining.map(|finding| Unsure {
         line: None,
@@ -160,4 +142,32 @@ pub fn new_study_with(
         unsure,
         check: examined,
     })
+}
+
+/// Checks the drafted study and corrects it, until `check` finds nothing to correct. Returns the last findings.
+fn corrected(
+    request: &NewStudy,
+    options: &RunOptions<'_>,
+    draft: &mut Draft,
+    unsure: &mut Vec<Unsure>,
+) -> Result<Option<StudyCheck>, Error> {
+    let mut examined = None;
+    for _ in 0..MAX_ROUNDS {
+        let study = request.study(draft)?;
+        let found = match check(&study, &request.out, options) {
+            Ok(found) => found.check,
+            Err(error @ Error::Interrupted { .. }) => return Err(error),
+            // Except for the part that the error names, the study is known, so it is written.
+            Err(error) => {
+                unsure.push(Unsure { line: None, proposed: Vec::new(), reason: error.to_string() });
+                break;
+            }
+        };
+        let changed = draft.apply_corrections(&found);
+        examined = Some(found);
+        if !changed {
+            break;
+        }
+    }
+    Ok(examined)
 }

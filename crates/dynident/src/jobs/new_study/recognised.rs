@@ -20,7 +20,7 @@ use crate::jobs::columns::{
     time_unit_s, unit as unit_of_name, with_unit,
 };
 use crate::result::{LogContents, Unsure};
-use dynident_model::{JointKind, Model};
+use dynident_model::Model;
 use std::path::Path;
 
 /// The columns that a study uses, among all columns of its recordings.
@@ -65,6 +65,103 @@ pub(super) struct LogClock {
     pub(super) counts: bool,
 }
 
+impl LogClock {
+    /// The clock of a group of channels.
+    fn of_group(contents: &LogContents, number: usize) -> Option<Self> {
+        let group = contents.groups.get(number)?;
+        let name = group.time.as_ref()?;
+        let unit = contents.unit(number, name);
+        let is_named = group.name.is_some() || time_unit_s(&with_unit(name, unit)).is_some();
+        let is_unit_of_rate = unit_of_name(name).is_none() && unit == Some("ms") && group.rate_hz == Some(1000.0);
+        let channel = contents.channels.iter().find(|channel| channel.name == *name);
+        let starts = channel.and_then(|channel| channel.range).is_some_and(|[first, _]| [0.0, 1.0].contains(&first));
+        let counts = is_unit_of_rate && starts;
+        Some(Self { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named, counts })
+    }
+}
+
+/// Columns that belong to the joints by their names, or else by their order.
+fn joined_families(logs: &[(&Path, LogContents)], robot: &RobotJoints<'_>, counts: [usize; 2]) -> Vec<Family> {
+    let mut all = families(logs.iter().map(|(path, log)| (*path, log)), robot.names);
+    if all.is_empty() {
+        all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
+    }
+    with_numbered_names(&with_partly_foreign_names(&all, logs, robot), logs, robot)
+}
+
+/// Names of the joints in columns of the same kind as the positions, without columns of another publisher.
+fn names_of_same_kind(all: &[Family], position: &Family, log: &LogContents) -> Vec<String> {
+    let same_kind = |family: &&Family| {
+        (family.file, family.group, family.quantity, &family.stem)
+            == (position.file, position.group, position.quantity, &position.stem)
+    };
+    all.iter()
+        .filter(same_kind)
+        .flat_map(|family| &family.columns)
+        .filter(|(_, name)| !is_of_other_publisher(position, name, log))
+        .filter_map(|(key, _)| match key {
+            JointKey::Name(name) => Some(name.clone()),
+            JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+        })
+        .collect()
+}
+
+/// The first of `further` with unknown columns, one for each joint.
+fn new_family(further: Vec<Family>, all: &[Family], counts: [usize; 2]) -> Option<Family> {
+    let is_known = |name: &String| all.iter().flat_map(|family| &family.columns).any(|(_, known)| known == name);
+    let is_new = |family: &Family| {
+        (counts.contains(&family.columns.len()) || family.basis == Basis::JointNames)
+            && family.columns.iter().all(|(_, name)| !is_known(name))
+    };
+    further.into_iter().find(is_new)
+}
+
+/// Columns of torques, or else of commands, next to the positions: for each of both, `places` are tried in this order.
+fn torque_or_command(
+    all: &[Family],
+    position: &Family,
+    logs: &[(&Path, LogContents)],
+    places: [&dyn Fn(&Family) -> bool; 2],
+) -> Option<Family> {
+    let is_commanded = |family: &Family| position.source != Source::Commanded && family != position;
+    let command = places.iter().find_map(|fits| best_command(all, |family| is_commanded(family) && fits(family)));
+    let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
+    let torques = |is_recorded: bool| {
+        let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
+        places.iter().find_map(|fits| best_torque(all, Some(position), |family| is_usable(family) && fits(family)))
+    };
+    torques(true).or_else(|| torques(false)).or(command).cloned()
+}
+
+/// Indices of the recordings with the columns of positions and torques. If both are in different files, it is the file
+/// of the positions.
+fn files_with(logs: &[(&Path, LogContents)], [position, drive]: [(&Family, &[String]); 2]) -> Vec<usize> {
+    if drive.0.file != position.0.file {
+        return vec![position.0.file];
+    }
+    let has = |log: &LogContents, name: &String| log.channels.iter().any(|channel| channel.name == *name);
+    let holds = |file: &usize| position.1.iter().chain(drive.1).all(|name| has(&logs[*file].1, name));
+    (0..logs.len()).filter(holds).collect()
+}
+
+/// Number of rows per row with values in all columns.
+fn rows_of_complete_one(logs: &[(&Path, LogContents)], chosen: [(&Family, &[String]); 2], files: &[usize]) -> f64 {
+    let is_pair = chosen[0].0.file != chosen[1].0.file;
+    let mut most = 1.0_f64;
+    for (family, columns) in chosen {
+        let own = core::slice::from_ref(&family.file);
+        for &file in if is_pair { own } else { files } {
+            let channel = |name: &String| logs[file].1.channels.iter().find(|channel| channel.name == *name);
+            let shares = columns
+                .iter()
+                .filter_map(channel)
+                .map(|own| (own.samples + own.missing) as f64 / own.samples.max(1) as f64);
+            most = shares.fold(most, f64::max);
+        }
+    }
+    most
+}
+
 impl RecognisedColumns {
     /// Finds the columns of `logs` for the joints of `model`.
     ///
@@ -77,31 +174,17 @@ impl RecognisedColumns {
     ) -> Result<Self, NewStudyError> {
         let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
-        let is_rotary = |joint: &usize| model.joints()[*joint].kind != JointKind::Prismatic;
-        let turning = free.iter().copied().filter(is_rotary).collect();
-        let moves = |other: usize, joint: usize| other != joint && model.moves(other, model.body_of(joint));
-        let carriers_of = |joint| (0..model.dof()).filter(|&other| moves(other, joint)).collect();
-        let carriers = (0..model.dof()).map(carriers_of).collect();
-        let robot = RobotJoints { names: &names, free, turning, carriers };
+        let robot = RobotJoints::new(model, &names, free);
         let paths = || logs.iter().map(|(path, log)| (*path, log));
-        let mut all = families(paths(), &names);
         let counts = [robot.free.len(), robot.turning.len()];
-        if all.is_empty() {
-            all = logs.iter().enumerate().flat_map(|(file, (_, log))| families_by_order(file, log, &counts)).collect();
-        }
-        let joined = with_numbered_names(&with_partly_foreign_names(&all, logs, &robot), logs, &robot);
+        let joined = joined_families(logs, &robot, counts);
         let mut all = without_foreign_grippers(&without_other_arms(&joined, &robot), &robot);
         let missing =
             |quantity, all: &[Family]| NewStudyError::NotRecognised { quantity, found: recognised(all, logs) };
         // Columns with unknown names, one for each joint.
         let assume = |all: &mut Vec<Family>, quantity| {
-            let known: Vec<String> =
-                all.iter().flat_map(|family| &family.columns).map(|(_, name)| name.clone()).collect();
-            let is_new = |family: &Family| {
-                (counts.contains(&family.columns.len()) || family.basis == Basis::JointNames)
-                    && family.columns.iter().all(|(_, name)| !known.contains(name))
-            };
-            all.extend(families_without_quantity(paths(), &names, quantity).into_iter().find(is_new));
+            let further = families_without_quantity(paths(), &names, quantity);
+            all.extend(new_family(further, all, counts));
         };
         if best(&all, Quantity::Position, |_| true).is_none() {
             assume(&mut all, Quantity::Position);
@@ -112,20 +195,7 @@ impl RecognisedColumns {
             .filter(|family| **family == found)
             .for_each(|family| family.columns.clone_from(&position.columns));
         let position = &position;
-        let same_kind = |family: &&Family| {
-            (family.file, family.group, family.quantity, &family.stem)
-                == (position.file, position.group, position.quantity, &position.stem)
-        };
-        let left_out: Vec<String> = joined
-            .iter()
-            .filter(same_kind)
-            .flat_map(|family| &family.columns)
-            .filter(|(_, name)| !is_of_other_publisher(position, name, &logs[position.file].1))
-            .filter_map(|(key, _)| match key {
-                JointKey::Name(name) => Some(name.clone()),
-                JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
-            })
-            .collect();
+        let left_out = names_of_same_kind(&joined, position, &logs[position.file].1);
         let logged =
             logged_joints(position, &robot, &left_out).ok_or_else(|| NewStudyError::MoreColumnsThanJoints {
                 columns: position.columns.len(),
@@ -166,25 +236,11 @@ impl RecognisedColumns {
         let in_other_file = |family: &Family| {
             family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
         };
-        let is_commanded = |family: &Family| position.source != Source::Commanded && family != position;
-        let find_drive = |all: &[Family]| {
-            let command = best_command(all, |family| is_commanded(family) && in_same_file(family))
-                .or_else(|| best_command(all, |family| is_commanded(family) && in_other_file(family)));
-            let is_torque = |family: &Family| command.is_none() || !is_unsigned(family, &logs[family.file].1);
-            let torques = |is_recorded: bool, fits: &dyn Fn(&Family) -> bool| {
-                let is_usable = |family: &Family| is_torque(family) && (family.source.is_recorded() || !is_recorded);
-                best_torque(all, Some(position), |family| is_usable(family) && fits(family))
-            };
-            let torque = torques(true, &in_same_file)
-                .or_else(|| torques(true, &in_other_file))
-                .or_else(|| torques(false, &in_same_file))
-                .or_else(|| torques(false, &in_other_file));
-            torque.or(command).cloned()
-        };
-        let mut drive = find_drive(&all);
+        let places: [&dyn Fn(&Family) -> bool; 2] = [&in_same_file, &in_other_file];
+        let mut drive = torque_or_command(&all, position, logs, places);
         if drive.is_none() {
             assume(&mut all, Quantity::Torque);
-            drive = find_drive(&all);
+            drive = torque_or_command(&all, position, logs, places);
         }
         let none = || missing("torques, currents or commanded positions", &all);
         let drive = &drive.ok_or_else(none)?;
@@ -217,11 +273,7 @@ impl RecognisedColumns {
             if shares.contains(&place) {
                 return LockedJoint::share(joint, &of_position[place]);
             }
-            let carries = robot.carriers.iter().enumerate().any(|(other, carriers)| {
-                let at = logged.joints.iter().position(|logged| *logged == other);
-                carriers.contains(&joint) && at.is_some_and(|at| !still.contains(&at))
-            });
-            LockedJoint::still(joint, &of_position[place], carries)
+            LockedJoint::still(joint, &of_position[place], robot.carries_moving(joint, &logged.joints, &still))
         };
         let locked: Vec<LockedJoint> = still.iter().map(|place| place_of(*place)).chain(apart).collect();
         let moving = |columns: &[String]| -> Vec<String> {
@@ -231,37 +283,10 @@ impl RecognisedColumns {
         let (of_position, of_drive) = (moving(&of_position), moving(&of_drive));
         let joints = logged.joints.iter().enumerate().filter(|(place, _)| !still.contains(place));
         let joints = joints.map(|(_, joint)| *joint).collect();
-        let has = |log: &LogContents, columns: &[String]| {
-            columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
-        };
-        let is_pair = drive.file != position.file;
-        let holds = |file: &usize| {
-            let log = &logs[*file].1;
-            if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_drive) }
-        };
-        let contents = &logs[position.file].1;
-        let group = contents.groups.get(position.group);
-        let time = group.and_then(|group| {
-            let name = group.time.as_ref()?;
-            let unit = contents.unit(position.group, name);
-            let is_named = group.name.is_some() || time_unit_s(&with_unit(name, unit)).is_some();
-            let is_unit_of_rate = unit_of_name(name).is_none() && unit == Some("ms") && group.rate_hz == Some(1000.0);
-            let channel = contents.channels.iter().find(|channel| channel.name == *name);
-            let starts =
-                channel.and_then(|channel| channel.range).is_some_and(|[first, _]| [0.0, 1.0].contains(&first));
-            let counts = is_unit_of_rate && starts;
-            Some(LogClock { key: time_as_toml(name, unit), rate_hz: group.rate_hz, is_named, counts })
-        });
-        let files: Vec<usize> = (0..logs.len()).filter(holds).collect();
-        let used = |log: &LogContents, name: &String| {
-            let channel = log.channels.iter().find(|channel| channel.name == *name)?;
-            Some((channel.samples + channel.missing) as f64 / channel.samples.max(1) as f64)
-        };
-        let shares = [(position, &of_position), (drive, &of_drive)].into_iter().flat_map(|(family, columns)| {
-            let own = if is_pair { vec![family.file] } else { files.clone() };
-            own.into_iter().flat_map(move |file| columns.iter().filter_map(move |name| used(&logs[file].1, name)))
-        });
-        let rows_of_complete_one = shares.fold(1.0, f64::max);
+        let time = LogClock::of_group(&logs[position.file].1, position.group);
+        let chosen = [(position, &of_position[..]), (drive, &of_drive)];
+        let files = files_with(logs, chosen);
+        let rows_of_complete_one = rows_of_complete_one(logs, chosen, &files);
         Ok(Self {
             thresholds: thresholds.clone(),
             columns: [of_position, of_drive],

@@ -76,7 +76,7 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoDes
     let model = robot.model();
     let section = study.drive.servo.clone().unwrap_or_default();
     let in_study = |error: StudyError| Error::section(study.path, "drive.servo")(error);
-    let drives = drives(study, &folders, (&robot, &section))?;
+    let drives = drives(study, &folders, &robot, &section)?;
     let floor = section.floor(model).map_err(in_study)?;
     let servos = ServoRobot { model: model.clone(), drives, floor };
     let LimitsInForce { limits, assumed, not_checked } = limits_of_commands(study, &folders, &robot)?;
@@ -116,10 +116,11 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoDes
 fn drives(
     study: StudyFile<'_>,
     folders: &Folders,
-    (robot, section): (&StudyRobot, &ServoSection),
+    robot: &StudyRobot,
+    section: &ServoSection,
 ) -> Result<Vec<Drive>, Error> {
     let in_study = |error: StudyError| Error::section(study.path, "drive.servo")(error);
-    let runs = if study.fits_commands() { training_runs(study, folders, (robot, section))? } else { Vec::new() };
+    let runs = if study.fits_commands() { training_runs(study, folders, robot, section)? } else { Vec::new() };
     if runs.is_empty() {
         return section.stated_drives(robot.model().dof()).map_err(in_study);
     }

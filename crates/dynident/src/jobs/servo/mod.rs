@@ -108,7 +108,8 @@ fn from_files(study: StudyFile<'_>, options: &RunOptions<'_>) -> Result<ServoOut
 fn training_runs(
     study: StudyFile<'_>,
     folders: &Folders,
-    (robot, section): (&StudyRobot, &ServoSection),
+    robot: &StudyRobot,
+    section: &ServoSection,
 ) -> Result<Vec<Run>, Error> {
     let sources = study.log_sources(folders)?;
     let training = sources.iter().enumerate().filter(|(index, _)| study.log[*index].role != Role::Validate);

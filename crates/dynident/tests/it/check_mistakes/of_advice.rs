@@ -45,6 +45,19 @@ fn followed_advice_explains_the_torque_as_announced() {
             kind: "order",
             named: &[],
         },
+        // The line of the second correction must contain the first one.
+        Case {
+            name: "two reversed torques",
+            rows: |rows| {
+                each(rows, |row| {
+                    row[8] = -row[8];
+                    row[10] = -row[10];
+                });
+            },
+            study: SAME,
+            kind: "sign",
+            named: &[],
+        },
         Case {
             name: "zero of the elbow",
             rows: |rows| each(rows, |row| row[3] += 0.5),

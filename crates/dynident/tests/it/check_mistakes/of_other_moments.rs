@@ -96,7 +96,7 @@ fn a_lag_or_a_gain_of_the_held_out_log_is_its_own() {
             rows: |rows| each(rows, |row| row[8] *= 1.3),
             study: SAME,
             kind: "unit",
-            named: &["[[log]] 2: format.torque write `scale = [1.0, 0.7"],
+            named: &["in [[log]] 2 write `format = { position = { columns = \"q{1..6}_rad\" }, time = "],
         },
     ];
     for case in &cases {

@@ -19,7 +19,7 @@ fn a_crane_and_a_watch_are_examined_alike() {
         let found = examined(scale);
         let mut differences = Differences::new(scale);
         let score = |check: &StudyCheck| check.as_written.as_ref().unwrap().score;
-        differences.compare("score", (score(&found), score(&expected)), 1e-2 * score(&expected).abs());
+        differences.compare("score", score(&found), score(&expected), 1e-2 * score(&expected).abs());
         differences.equal("findings", &found.findings, &expected.findings);
         all.extend(differences.found);
     }

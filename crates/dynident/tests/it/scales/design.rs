@@ -56,21 +56,21 @@ fn compare(scale: Scale, found: &DesignFile, expected: &DesignFile) -> Vec<Strin
     differences.equal("motion", &found.parameters, &expected.parameters);
     for (found, expected) in found.limits.iter().zip(&expected.limits) {
         differences.equal("limit", &(found.kind, words(&found.joint)), &(expected.kind, words(&expected.joint)));
-        differences.compare(&expected.joint, (found.worst_ratio, expected.worst_ratio), TOLERANCE);
+        differences.compare(&expected.joint, found.worst_ratio, expected.worst_ratio, TOLERANCE);
     }
     // Information is an inverse square of parameters.
     let constant: f64 = expected.forecast.iter().map(|parameter| -2.0 * scale.of(&parameter.unit).ln()).sum();
     let log_det = |file: &DesignFile| file.log_det_weighted.unwrap();
-    differences.compare("log det", (log_det(found) - constant, log_det(expected)), TOLERANCE * log_det(expected).abs());
+    differences.compare("log det", log_det(found) - constant, log_det(expected), TOLERANCE * log_det(expected).abs());
     let condition = |file: &DesignFile| file.condition_number_scaled.unwrap();
-    differences.compare("condition", (condition(found), condition(expected)), TOLERANCE * condition(expected));
+    differences.compare("condition", condition(found), condition(expected), TOLERANCE * condition(expected));
     for (found, expected) in found.forecast.iter().zip(&expected.forecast) {
         let factor = scale.of(&expected.unit);
         let [found, expected] = [found, expected].map(|forecast| forecast.std.unwrap());
-        differences.compare("forecast", (found / factor, expected), TOLERANCE * expected);
+        differences.compare("forecast", found / factor, expected, TOLERANCE * expected);
     }
     for (found, expected) in found.worst_directions.iter().zip(&expected.worst_directions) {
-        differences.compare("inflation", (found.inflation, expected.inflation), TOLERANCE * expected.inflation);
+        differences.compare("inflation", found.inflation, expected.inflation, TOLERANCE * expected.inflation);
     }
     let all_words = |file: &DesignFile| -> Vec<String> {
         [&file.diagnosis, &file.assumed, &file.not_checked, &file.notes]

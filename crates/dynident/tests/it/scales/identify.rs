@@ -25,9 +25,9 @@ fn compare_parameters(differences: &mut Differences, found: &ResultFile, expecte
         let factor = differences.scale.of(&expected.unit);
         let within = TOLERANCE * (expected.value.abs() + expected.std);
         let physical = |parameter: &BaseParameterResult| parameter.physical.unwrap();
-        differences.compare(&expected.symbol, (found.value / factor, expected.value), within);
-        differences.compare(&expected.symbol, (found.std / factor, expected.std), TOLERANCE * expected.std);
-        differences.compare(&expected.symbol, (physical(found) / factor, physical(expected)), within);
+        differences.compare(&expected.symbol, found.value / factor, expected.value, within);
+        differences.compare(&expected.symbol, found.std / factor, expected.std, TOLERANCE * expected.std);
+        differences.compare(&expected.symbol, physical(found) / factor, physical(expected), within);
         differences.equal("excited", &found.excited, &expected.excited);
     }
     for (found, expected) in found.bodies.iter().zip(&expected.bodies) {
@@ -46,8 +46,8 @@ fn compare_choices(differences: &mut Differences, found: &ResultFile, expected: 
     let (of_found, of_expected) = (cutoffs(found), cutoffs(expected));
     differences.equal("cut-offs tried", &of_found.len(), &of_expected.len());
     for (found, expected) in of_found.into_iter().zip(of_expected) {
-        differences.compare("cut-off", (found.0 * time, expected.0), TOLERANCE * expected.0);
-        differences.compare("error of a cut-off", (found.1, expected.1), OF_TEXTS * expected.1);
+        differences.compare("cut-off", found.0 * time, expected.0, TOLERANCE * expected.0);
+        differences.compare("error of a cut-off", found.1, expected.1, OF_TEXTS * expected.1);
     }
     let (lag, expected_lag) = (&found.method.torque_lag, &expected.method.torque_lag);
     differences.equal("lag taken off", &lag.kind, &expected_lag.kind);
@@ -57,8 +57,8 @@ fn compare_choices(differences: &mut Differences, found: &ResultFile, expected: 
         differences.equal("a lag", &found.is_some(), &expected.is_some());
         let (Some(found), Some(expected)) = (found, expected) else { continue };
         let within = TOLERANCE * (expected.lag_s.abs() + expected.std_s);
-        differences.compare("lag", (found.lag_s / time, expected.lag_s), within);
-        differences.compare("bar of a lag", (found.std_s / time, expected.std_s), TOLERANCE * expected.std_s);
+        differences.compare("lag", found.lag_s / time, expected.lag_s, within);
+        differences.compare("bar of a lag", found.std_s / time, expected.std_s, TOLERANCE * expected.std_s);
         differences.equal("lag matters", &found.matters, &expected.matters);
     }
     let rows = |result: &ResultFile| result.logs.iter().map(|log| log.filtered_rows).collect::<Vec<_>>();
@@ -79,7 +79,7 @@ fn compare_choices(differences: &mut Differences, found: &ResultFile, expected: 
         };
         differences.equal("constant", &name, &of);
         for (found, expected) in [(found, expected), (low, bounds[0]), (high, bounds[1])] {
-            differences.compare(&of, (found / factor, expected), TOLERANCE * expected.abs());
+            differences.compare(&of, found / factor, expected, TOLERANCE * expected.abs());
         }
     }
 }
@@ -87,7 +87,7 @@ fn compare_choices(differences: &mut Differences, found: &ResultFile, expected: 
 fn compare(scale: Scale, found: &IdentificationOutcome, expected: &IdentificationOutcome) -> Vec<String> {
     let mut differences = Differences::new(scale);
     for (found, expected) in errors(found).into_iter().zip(errors(expected)) {
-        differences.compare("held-out error", (found, expected), TOLERANCE * expected);
+        differences.compare("held-out error", found, expected, TOLERANCE * expected);
     }
     compare_parameters(&mut differences, &found.result, &expected.result);
     compare_choices(&mut differences, &found.result, &expected.result);

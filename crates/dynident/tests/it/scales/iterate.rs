@@ -92,19 +92,19 @@ fn compare(scale: Scale, found: &IterationsFile, expected: &IterationsFile) -> V
         };
         differences.equal("choices", &choices(found), &choices(expected));
         for (found, expected) in found.max_tracking_error_rad.iter().zip(&expected.max_tracking_error_rad) {
-            differences.compare("tracking", (*found, *expected), TOLERANCE * expected);
+            differences.compare("tracking", *found, *expected, TOLERANCE * expected);
         }
         let parameters = found.parameters.iter().zip(&expected.parameters);
         for (found, expected) in parameters.chain(found.pooled.iter().zip(&expected.pooled)) {
             let factor = scale.of(&expected.unit);
             let (std, of) = (expected.std.unwrap(), &expected.symbol);
             differences.equal("symbol", &found.symbol, of);
-            differences.compare(of, (found.value / factor, expected.value), TOLERANCE * (expected.value.abs() + std));
-            differences.compare(of, (found.std.unwrap() / factor, std), TOLERANCE * std);
+            differences.compare(of, found.value / factor, expected.value, TOLERANCE * (expected.value.abs() + std));
+            differences.compare(of, found.std.unwrap() / factor, std, TOLERANCE * std);
         }
     }
     let ratio = |file: &IterationsFile| file.error_over_bound.unwrap();
-    differences.compare("error over bound", (ratio(found), ratio(expected)), TOLERANCE * ratio(expected));
+    differences.compare("error over bound", ratio(found), ratio(expected), TOLERANCE * ratio(expected));
     differences.found
 }
 

@@ -144,7 +144,7 @@ impl Differences {
         Self { scale, found: Vec::new() }
     }
 
-    fn compare(&mut self, what: &str, (found, expected): (f64, f64), tolerance: f64) {
+    fn compare(&mut self, what: &str, found: f64, expected: f64, tolerance: f64) {
         if (found - expected).abs().is_nan() || (found - expected).abs() > tolerance {
             self.found.push(format!("{:?}: {what} {found} for {expected}", self.scale));
         }
