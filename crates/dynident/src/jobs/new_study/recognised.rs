@@ -1,7 +1,7 @@
 //! The columns that a study uses, among all columns of its recordings.
 
 use super::channels::{
-    LoggedJoints, RobotJoints, in_order, logged_joints, partial_places, probable_columns, with_numbered_names,
+    LoggedJoints, RobotJoints, in_order, logged_joints, probable_columns, with_numbered_names,
     with_partly_foreign_names, without_foreign_grippers, without_other_arms,
 };
 use super::draft::RenamedFiles;
