@@ -44,7 +44,7 @@ use holes::straight_lines;
 use overflow::overflows;
 use rows::LogRows;
 use scan::scan;
-use trend::trends;
+use trend::{Trend, trends};
 
 /// Events of one log, and the residuals in which they were found.
 #[derive(Clone, Debug, Default)]
@@ -83,7 +83,8 @@ pub fn find_events(
     for one in &overflows {
         rows.leave_out(&one.times_s, settings.overflow.margin_bins * rows.bin_s);
     }
-    let Some(scan) = scan(&rows) else { return Ok(EventSearch::default()) };
+    let plain = rows.without_presliding();
+    let Some(scan) = scan(&plain, &rows) else { return Ok(EventSearch::default()) };
     let mut events: Vec<LogEvent> = scan.intervals.iter().map(|one| of_interval(&rows, robot, &scan, one)).collect();
     let names = robot.joint_names();
     events.extend(lines.iter().map(|&times_s| of_filled_hole(&rows, &scan, &names, times_s)));
@@ -93,7 +94,9 @@ pub fn find_events(
         events.extend(one.times_s.iter().map(|&times_s| of_overflow(one, times_s, &names, is_clear, duration_s)));
     }
     events.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-    events.extend(trends(&rows, &scan).iter().map(|trend| of_trend(&rows, trend, &names)));
+    let trends = [&plain, &rows].map(|rows| trends(rows, &scan));
+    let is_confirmed = |one: &&Trend| trends[1].iter().any(|other| (other.joint, other.kind) == (one.joint, one.kind));
+    events.extend(trends[0].iter().filter(is_confirmed).map(|trend| of_trend(&rows, trend, &names)));
     let LogRows { bin_s, time_s, tau, .. } = rows;
     Ok(EventSearch { events, bin_s, time_s, measured: tau, residuals: scan.residuals })
 }

@@ -2,7 +2,7 @@
 
 use crate::rows::LogRows;
 use core::ops::Range;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Regularisation relative to the mean diagonal; columns have similar scales.
 const RIDGE: f64 = 1e-7;
@@ -64,7 +64,18 @@ impl Normal {
 
     /// Least squares parameters; `None` without rows.
     pub(crate) fn solution(&self) -> Option<DVector<f64>> {
-        let width = self.gram.nrows() - 1;
+        let width = self.width();
+        Some(self.factor()?.solve(&self.gram.view((0, width), (width, 1)).column(0).into_owned()))
+    }
+
+    /// Variance of the predicted torque for this row of columns, relative to the variance of a bin with the weight 1;
+    /// `None` without rows.
+    pub(crate) fn leverage(&self, row: &DVector<f64>) -> Option<f64> {
+        Some(row.dot(&self.factor()?.solve(row)))
+    }
+
+    fn factor(&self) -> Option<Cholesky<f64, Dyn>> {
+        let width = self.width();
         if width == 0 || self.weight == 0.0 {
             return None;
         }
@@ -73,8 +84,7 @@ impl Normal {
         for place in 0..width {
             matrix[(place, place)] += ridge;
         }
-        let right = self.gram.view((0, width), (width, 1)).column(0).into_owned();
-        Some(matrix.cholesky()?.solve(&right))
+        matrix.cholesky()
     }
 
     /// Weighted sum of squared residuals with the given parameters.

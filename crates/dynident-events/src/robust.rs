@@ -1,7 +1,7 @@
 //! Fits of all joints, and a robust first fit that excludes the least consistent blocks of the log.
 
 use crate::normal::Normal;
-use crate::rows::{DRIVE_COLUMNS, LogRows, median};
+use crate::rows::{DRIVE_COLUMNS, DRY_FRICTION, LogRows, median};
 use core::ops::Range;
 use nalgebra::DVector;
 
@@ -153,5 +153,5 @@ pub(crate) fn dry_friction_of_joint(rows: &LogRows, joint: usize, theta: &DVecto
         let scale = rows.drive_scale[joint][column];
         if scale > 1e-12 { theta[drive + column] / scale } else { 0.0 }
     };
-    (value(1) + value(2)).abs()
+    DRY_FRICTION.map(value).sum::<f64>().abs()
 }

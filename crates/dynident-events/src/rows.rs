@@ -10,9 +10,13 @@ use dynident_rows::{LogError, LogPass, PANEL_SAMPLES};
 const SAMPLES_PER_BIN: usize = 4;
 /// Maximum number of bins; longer logs have longer bins.
 const MAX_BINS: f64 = 20_000.0;
-/// Number of columns that are added for each joint: offset, two smoothed signs of the velocity (narrow and wide), two
-/// powers of velocity, drive inertia, friction that grows with the torque.
-pub(crate) const DRIVE_COLUMNS: usize = 7;
+/// Number of columns that are added for each joint: offset, two smoothed signs of the velocity (narrow and wide),
+/// presliding friction, two powers of velocity, drive inertia, friction that grows with the torque.
+pub(crate) const DRIVE_COLUMNS: usize = 8;
+/// Columns of dry friction among them.
+pub(crate) const DRY_FRICTION: core::ops::Range<usize> = 1..4;
+/// Column of presliding friction among them.
+const PRESLIDING: usize = 3;
 
 /// One log, averaged over bins. Vectors of joints are in the order of the model.
 #[derive(Clone, Debug, Default)]
@@ -196,6 +200,7 @@ impl LogRows {
         self.columns = self.width.iter().map(|width| vec![0.0; width * bins]).collect();
         self.step = (0..joints).map(|joint| (own.narrow_step_ratio * rms(&of.dq[joint])).max(1e-9)).collect();
         self.rest = (0..joints).map(|joint| own.rest_ratio * rms(&of.dq[joint])).collect();
+        let presliding: Vec<Vec<f64>> = (0..joints).map(|joint| self.presliding(joint, of)).collect();
         let mut counts = vec![0.0; bins];
         for &bin in &of.bin {
             counts[bin] += 1.0;
@@ -229,7 +234,8 @@ impl LogRows {
                     }
                     let (dq, ddq) = (of.dq[joint][from + sample], of.ddq[joint][from + sample]);
                     let steps = [self.step[joint], own.wide_step_ratio * self.step[joint]];
-                    let drives = drive_columns([dq, ddq], self.tau[joint][bin], steps);
+                    let held = presliding[joint][from + sample];
+                    let drives = drive_columns([dq, ddq, held], self.tau[joint][bin], steps);
                     for (value, drive) in row[body..].iter_mut().zip(drives) {
                         *value += share * drive;
                     }
@@ -239,6 +245,20 @@ impl LogRows {
         }
         self.scale_columns();
         self.weight = vec![vec![1.0; bins]; joints];
+    }
+
+    /// Presliding friction at each sample, from -1 to 1: `z += Δq / reach`, limited to ±1. A joint that rests keeps the
+    /// value of its last motion. Zero at the start of a piece, because the motion before it is unknown.
+    fn presliding(&self, joint: usize, of: &Collected) -> Vec<f64> {
+        let reach = (self.settings.bins.presliding_ratio * rms(&of.dq[joint]) * self.bin_s).max(f64::MIN_POSITIVE);
+        let q = &of.q[joint];
+        let mut held = 0.0_f64;
+        let next = |at: usize| {
+            let is_first = at == 0 || self.piece[of.bin[at]] != self.piece[of.bin[at - 1]];
+            held = if is_first { 0.0 } else { (held + (q[at] - q[at - 1]) / reach).clamp(-1.0, 1.0) };
+            held
+        };
+        (0..q.len()).map(next).collect()
     }
 
     /// Scales every column to a root mean square of 1. Marks bins with values that are not finite as unusable.
@@ -291,6 +311,15 @@ impl LogRows {
         Self { weight: variance.iter().map(of_joint).collect(), samples: Vec::new(), ..self.clone() }
     }
 
+    /// The same rows without presliding friction.
+    pub(crate) fn without_presliding(&self) -> Self {
+        let mut plain = Self { samples: Vec::new(), ..self.clone() };
+        for (columns, width) in plain.columns.iter_mut().zip(&self.width) {
+            columns.chunks_exact_mut(*width).for_each(|row| row[width - DRIVE_COLUMNS + PRESLIDING] = 0.0);
+        }
+        plain
+    }
+
     /// Whether any joint moves in a bin.
     pub(crate) fn is_moving(&self, bin: usize) -> bool {
         (0..self.joints()).any(|joint| self.dq[joint][bin].abs() > self.rest[joint])
@@ -312,11 +341,11 @@ impl LogRows {
     }
 }
 
-/// Values of the columns for offset, narrow and wide smoothed sign of the velocity, velocity, signed square of the
-/// velocity, acceleration, and friction that grows with the torque.
-fn drive_columns([dq, ddq]: [f64; 2], tau: f64, [narrow, wide]: [f64; 2]) -> [f64; DRIVE_COLUMNS] {
+/// Values of the columns for offset, narrow and wide smoothed sign of the velocity, presliding friction, velocity,
+/// signed square of the velocity, acceleration, and friction that grows with the torque.
+fn drive_columns([dq, ddq, held]: [f64; 3], tau: f64, [narrow, wide]: [f64; 2]) -> [f64; DRIVE_COLUMNS] {
     let wide = (dq / wide).tanh();
-    [1.0, (dq / narrow).tanh(), wide, dq, dq * dq.abs(), ddq, tau.abs() * wide]
+    [1.0, (dq / narrow).tanh(), wide, held, dq, dq * dq.abs(), ddq, tau.abs() * wide]
 }
 
 pub(crate) fn rms(values: &[f64]) -> f64 {

@@ -7,6 +7,7 @@ use crate::robust::{Blocks, Fit, dry_friction, residuals};
 use crate::rows::{LogRows, rms};
 use crate::settings::EventSettings;
 use core::ops::Range;
+use nalgebra::DVector;
 
 /// Rounds of search and refit.
 const ROUNDS: usize = 4;
@@ -41,8 +42,9 @@ pub(crate) struct Scan {
     pub(crate) kept: Vec<bool>,
 }
 
-/// Searches one log. `None` if it has too few rows.
-pub(crate) fn scan(rows: &LogRows) -> Option<Scan> {
+/// Searches one log. Events must also be events `with_presliding` friction, which only joints that keep the friction of
+/// their last motion at rest have. `None` if the log has too few rows.
+pub(crate) fn scan(rows: &LogRows, with_presliding: &LogRows) -> Option<Scan> {
     let blocks = Blocks::new(rows);
     let mut fit = blocks.trimmed_fit()?;
     let mut kept = vec![true; rows.len()];
@@ -68,7 +70,9 @@ pub(crate) fn scan(rows: &LogRows) -> Option<Scan> {
         let variance = usual_variance(rows, &left, &dry_friction(rows, &refit), &kept);
         let judged: Vec<Interval> =
             found.iter().filter_map(|range| judged(rows, range, &kept, &sums, &refit, &left, &variance)).collect();
-        let confirmed = confirmed_events(rows, &found, &kept, &variance);
+        let confirmed = [rows, with_presliding]
+            .iter()
+            .fold(found.clone(), |events, model| confirmed_events(model, &events, &kept, &variance));
         let is_kept = |one: &&Interval| {
             one.is_off || one.is_stop || one.passes_warning(&rows.settings) && confirmed.contains(&one.bins)
         };
@@ -238,7 +242,9 @@ fn judged(
     one.is_off = off_ranges(rows, range).is_some_and(|[at_rest, _]| is_off(rows, &at_rest, left, variance));
     let is_at_stop = |joint: &usize| {
         let effect = one.effect[*joint].max(mean_effect(rows, range, &left[*joint], *joint));
-        effect >= settings.min_effect && is_stop(rows, range, *joint, &left[*joint], &variance[*joint])
+        let of_prediction = prediction_variance(rows, range, *joint, &sums[*joint]);
+        let usual: Vec<f64> = variance[*joint].iter().map(|usual| usual * (1.0 + of_prediction)).collect();
+        effect >= settings.min_effect && is_stop(rows, range, *joint, &left[*joint], &usual)
     };
     let at_stop = (0..joints).find(is_at_stop);
     one.is_stop = at_stop.is_some_and(|joint| others_move(rows, range, joint));
@@ -277,16 +283,27 @@ fn mean_effect(rows: &LogRows, range: &Range<usize>, left: &[f64], joint: usize)
     rms(&left[range.clone()]) / rms(&rows.tau[joint]).max(f64::MIN_POSITIVE)
 }
 
-/// Whether one joint rests at the end of its range with a residual of constant sign that is larger than its friction.
-/// The free parameters of the joint could explain such a torque in a single posture, so this is tested separately.
+/// Variance of the mean torque in a range that the fit of the other bins predicts, relative to their usual residual.
+fn prediction_variance(rows: &LogRows, range: &Range<usize>, joint: usize, others: &Normal) -> f64 {
+    let mut mean = DVector::zeros(rows.width[joint]);
+    for bin in range.clone() {
+        mean += DVector::from_column_slice(rows.row(joint, bin)) / range.len() as f64;
+    }
+    others.leverage(&mean).unwrap_or(f64::INFINITY)
+}
+
+/// Whether one joint rests at the end of its range with a residual that presses against this end and is larger than its
+/// friction. The free parameters of the joint could explain such a torque in a single posture, so this is tested
+/// separately.
 fn is_stop(rows: &LogRows, range: &Range<usize>, joint: usize, left: &[f64], variance: &[f64]) -> bool {
     let own = rows.settings.stop;
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
     let q = &rows.q[joint];
     let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(*q), high.max(*q)));
     let near = own.max_distance * (high - low);
-    let is_at_end = mean(q) <= low + near || mean(q) >= high - near;
-    is_at_end && rests(rows, range, joint) && mean(left).powi(2) > own.min_residual_ratio * mean(variance)
+    let pressed = mean(left);
+    let is_against_end = mean(q) <= low + near && pressed < 0.0 || mean(q) >= high - near && pressed > 0.0;
+    is_against_end && rests(rows, range, joint) && pressed.powi(2) > own.min_residual_ratio * mean(variance)
 }
 
 /// Whether all joints rest with small torques, and some joint lacks the torque that carries the weight. A single

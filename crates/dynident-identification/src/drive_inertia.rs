@@ -106,6 +106,17 @@ pub fn choose_drive_inertia(
     training: &[usize],
     payloads: &[Payload],
 ) -> Result<(ParametricModel, Option<DriveInertiaChoice>), IdentificationError> {
+    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
+    drives_with_friction(&passes, robot, &robot.clone().into())
+}
+
+/// As [`choose_drive_inertia`], with the friction terms of `with_friction`.
+pub(crate) fn drives_with_friction(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    with_friction: &RegressorModel,
+) -> Result<(ParametricModel, Option<DriveInertiaChoice>), IdentificationError> {
+    let settings = passes.settings;
     let tested = joints_left_to_the_logs(robot, settings);
     if tested.is_empty() {
         return Ok((robot.clone(), None));
@@ -113,8 +124,8 @@ pub fn choose_drive_inertia(
     let name = |joint: usize| robot.model().joints()[joint].name.clone();
     let names: Vec<String> = tested.iter().map(|&joint| name(joint)).collect();
     let untested = |reason: &str| Ok((robot.clone(), Some(DriveInertiaChoice::untested(names.clone(), reason))));
-    let with_drives = with_drives(robot, &tested)?;
-    let apart = separate_columns(&with_drives, &tested);
+    let model = RegressorModel::from(with_drives(&with_friction.parametric, &tested)?);
+    let apart = separate_columns(&model.parametric, &tested);
     if apart.is_empty() {
         return untested("torque cannot tell it from the inertia of the links");
     }
@@ -126,9 +137,9 @@ pub fn choose_drive_inertia(
     // time segment.
     let estimation = EstimationSettings { covariance: CovarianceMethod::Jackknife, ..settings.estimation.clone() };
     let settings = IdentificationSettings { estimation, ..settings.clone() };
-    let passes = TrainingPasses { logs, settings: &settings, training, payloads, known_arm: None };
+    let passes = TrainingPasses { settings: &settings, ..*passes };
     let fit = || -> Result<Estimate, IdentificationError> {
-        let rows = passes.with_gains(passes.rows_once(RegressorModel::from(with_drives.clone()))?)?;
+        let rows = passes.with_gains(passes.fit(model)?)?;
         if let Some((estimate, _)) = rows.gains {
             return Ok(estimate);
         }
@@ -165,7 +176,7 @@ pub fn choose_drive_inertia(
         untested: None,
         drives: drives.collect(),
     };
-    Ok((if seen { with_drives } else { robot.clone() }, Some(choice)))
+    Ok((if seen { with_drives(robot, &tested)? } else { robot.clone() }, Some(choice)))
 }
 
 /// Joints whose drive inertia is a separate base parameter, with its column. At the first axes, drive inertia is only

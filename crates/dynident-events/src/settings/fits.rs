@@ -18,23 +18,34 @@ pub struct BinSettings {
     pub narrow_step_ratio: f64,
     /// Ratio of the velocity scales of the wide and the narrow friction function. 6.0 by default.
     pub wide_step_ratio: f64,
+    /// Distance after a reversal that reverses the presliding friction from zero, relative to the distance that the
+    /// joint moves in one bin at its root mean square velocity. 0.05 by default.
+    pub presliding_ratio: f64,
     /// Velocity below which a joint is at rest, relative to its root mean square velocity. 0.1 by default.
     pub rest_ratio: f64,
 }
 
 impl Default for BinSettings {
     fn default() -> Self {
-        Self { bin_s: 0.04, min_bins_per_parameter: 3, narrow_step_ratio: 0.03, wide_step_ratio: 6.0, rest_ratio: 0.1 }
+        Self {
+            bin_s: 0.04,
+            min_bins_per_parameter: 3,
+            narrow_step_ratio: 0.03,
+            wide_step_ratio: 6.0,
+            presliding_ratio: 0.05,
+            rest_ratio: 0.1,
+        }
     }
 }
 
 impl BinSettings {
-    pub(super) fn rules(&self) -> [Rule; 5] {
+    pub(super) fn rules(&self) -> [Rule; 6] {
         [
             ("bins.bin_s", self.bin_s, 1e-6, 1e3),
             ("bins.min_bins_per_parameter", self.min_bins_per_parameter as f64, 1.0, 1e6),
             ("bins.narrow_step_ratio", self.narrow_step_ratio, 1e-6, 1.0),
             ("bins.wide_step_ratio", self.wide_step_ratio, 1.0, 1e6),
+            ("bins.presliding_ratio", self.presliding_ratio, 1e-6, 1e3),
             ("bins.rest_ratio", self.rest_ratio, 0.0, 1.0),
         ]
     }

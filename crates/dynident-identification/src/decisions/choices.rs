@@ -54,6 +54,8 @@ pub(crate) struct Choices {
     /// Cut-off at which friction was selected, hertz; `None` if the study states the cut-off.
     pub(super) friction_hz: Option<f64>,
     pub(super) cutoff_with_friction: Option<CutoffByError>,
+    /// Whether drive inertia was tested with the selected friction. Then a revision of the lag does not change it.
+    pub(super) has_drives_with_friction: bool,
     /// Whether the lag that is compensated before friction is selected was decided.
     pub(super) has_lag_before_friction: bool,
     /// Whether friction was selected again at another cut-off.
@@ -72,6 +74,7 @@ impl Choices {
             friction: FrictionChoice::Open,
             friction_hz: None,
             cutoff_with_friction: None,
+            has_drives_with_friction: false,
             has_lag_before_friction: false,
             has_cutoff_of_friction: false,
             origin: Origin::TheseLogs,
@@ -120,11 +123,19 @@ impl Choices {
         self.origin = Origin::Final;
     }
 
+    /// Opens the cut-off and friction again, because drive inertia or the lag changed.
+    pub(super) fn reopen_friction(&mut self) {
+        (self.cutoff, self.grid) = (None, None);
+        (self.friction, self.friction_hz, self.cutoff_with_friction) = (FrictionChoice::Open, None, None);
+    }
+
     pub(super) fn reopen(&mut self) {
         match &self.origin {
             Origin::TheseLogs => {
-                (self.drives, self.cutoff, self.grid) = (None, None, None);
-                (self.friction, self.friction_hz, self.cutoff_with_friction) = (FrictionChoice::Open, None, None);
+                if !self.has_drives_with_friction {
+                    self.drives = None;
+                }
+                self.reopen_friction();
             }
             Origin::Excerpt(friction) => self.friction = FrictionChoice::OfExcerpt(friction.clone()),
             Origin::Final => {}

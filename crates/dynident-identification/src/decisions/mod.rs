@@ -22,10 +22,10 @@ pub(crate) use workspace::{Job, Workspace};
 use cutoff::Cutoff;
 use cutoff_of_friction::CutoffOfFriction;
 use decision::Decision;
-use drive_inertia::DriveInertia;
+use drive_inertia::{DriveInertia, DriveInertiaWithFriction};
 use friction::Friction;
 use lag::Lag;
 use lag_before_friction::LagBeforeFriction;
 
-pub(crate) const DECISIONS: [&dyn Decision; 6] =
-    [&DriveInertia, &Cutoff, &LagBeforeFriction, &Friction, &Lag, &CutoffOfFriction];
+pub(crate) const DECISIONS: [&dyn Decision; 7] =
+    [&DriveInertia, &Cutoff, &LagBeforeFriction, &Friction, &Lag, &DriveInertiaWithFriction, &CutoffOfFriction];

@@ -73,6 +73,40 @@ fn drives_are_found_where_they_are() {
     assert!(square < 1.0 + 4.0 * (2.0 / count).sqrt(), "{square}: {figures:?}");
 }
 
+/// Slow motion with the presliding friction of Dahl, `dz/dt = 3 v (1 − z sgn(v)) / reach`, τ = 8 z. Viscous and Coulomb
+/// friction do not contain it, so they hide the drive inertia; the selected friction does not.
+#[test]
+fn presliding_friction_does_not_hide_drives() {
+    const COULOMB: f64 = 8.0;
+    const REACH_RAD: f64 = 1.0e-3;
+    let folder = tempfile::tempdir().unwrap();
+    let description = repository("robots/ur10.urdf");
+    for has_drives in [true, false] {
+        let truth = Truth::near(&description, 0.1, has_drives);
+        let (mut random, dof) = (Random(2), truth.drive.len());
+        let mut before: Option<Vec<f64>> = None;
+        let mut bristles = vec![0.0_f64; dof];
+        let row = |q: &[f64], tau: &[f64]| {
+            let last = before.replace(q.to_vec()).unwrap_or_else(|| q.to_vec());
+            let torque = |joint: usize| {
+                let step = q[joint] - last[joint];
+                let bristle = &mut bristles[joint];
+                *bristle = (*bristle + 3.0 * step / REACH_RAD * (1.0 - *bristle * step.signum())).clamp(-1.0, 1.0);
+                tau[joint] + COULOMB * *bristle + 0.1 * NOISE.0 * random.normal()
+            };
+            let torques: Vec<f64> = (0..dof).map(torque).collect();
+            [q.to_vec(), torques].concat()
+        };
+        let motion = Motion::within(&truth.model, 0.2, 1);
+        write_log(&folder.path().join("log.csv"), &truth, &motion, (200.0, 30.0), &header(dof), row);
+        let job = job(folder.path(), &description, dof, "");
+        let (with_stated_friction, _) = tested(&job);
+        assert!(with_stated_friction < 3.0, "{with_stated_friction}");
+        let choice = job.identify().result.drive_inertia_choice.unwrap();
+        assert_eq!(choice.seen, has_drives, "{choice:?}");
+    }
+}
+
 /// Files and columns are sufficient: the model equals that with a stated key, also in validation and export.
 #[test]
 fn what_the_logs_say_is_what_a_key_would() {
