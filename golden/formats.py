@@ -179,7 +179,12 @@ def numpy_files(out):
     # savez uses a fixed date for its members.
     np.savez_compressed(out / "packed.npz", t=T, q=Q, tau=TAU.T, gains=np.array([1.0, 2.0]), name=np.array("arm"))
     np.savez(out / "stored.npz", t=T, q=Q.T, half=F32[0].astype(np.float16))
+    # Names of the columns: as text in two encodings, and as Python objects, which are not read.
+    np.savez(out / "named.npz", joint_names=np.array(JOINTS, dtype=">U12"), t=T, q=Q, tau=TAU.T)
+    np.savez(out / "named_bytes.npz", joint_names=np.array(JOINTS, dtype="S"), t=T, q=Q, tau=TAU.T)
+    np.savez(out / "named_objects.npz", joint_names=np.array(JOINTS, dtype=object), t=T, q=Q, tau=TAU.T)
     columns = {str(k): matrix[:, k] for k in range(5)}
+    named = {"t": T} | {f"{name}[{JOINTS[k]}]": rows[k] for name, rows in (("q", Q), ("tau", TAU)) for k in range(2)}
     return {
         "matrix.npy": columns,
         "fortran.npy": columns,
@@ -187,6 +192,9 @@ def numpy_files(out):
         "structured.npy": {"t": T, "mode": np.arange(ROWS) % 3, "q[0]": F32[0], "q[1]": F32[1], "ticks": np.arange(ROWS) * -7},
         "packed.npz": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]},
         "stored.npz": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "half": F32[0].astype(np.float16)},
+        "named.npz": named,
+        "named_bytes.npz": named,
+        "named_objects.npz": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]},
     }
 
 

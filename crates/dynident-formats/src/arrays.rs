@@ -50,6 +50,14 @@ fn length(arrays: &[Array]) -> usize {
     shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
 
+/// Names of the entries of all matrices of a file.
+#[derive(Clone, Debug)]
+pub(crate) struct EntryNames {
+    /// The array of the names.
+    pub(crate) array: String,
+    pub(crate) names: Vec<String>,
+}
+
 /// Arrays as columns: a vector by its name, a matrix by name and 0-based index, such as `q[0]`. The samples may be
 /// along either dimension of a matrix (along its rows, if both fit). Arrays of another length are omitted.
 #[derive(Debug)]
@@ -91,6 +99,32 @@ impl ArrayTable {
             .map(|(_, array)| format!("{}: {} x {}, not of {rows} rows", array.name, array.shape[0], array.shape[1]))
             .collect();
         (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
+    }
+
+    /// Names the columns of each matrix with one column for each name, `q[elbow]` instead of `q[2]`. The names must be
+    /// unique and not be numbers; otherwise a note is added.
+    pub(crate) fn with_entry_names(mut self, entries: EntryNames) -> Self {
+        let EntryNames { array, names } = entries;
+        let is_name = |name: &String| name.parse::<u64>().is_err() && !name.trim().is_empty();
+        let are_unique = names.iter().enumerate().all(|(at, name)| !names[..at].contains(name));
+        let mut is_used = false;
+        if let Some(columns) =
+            self.names.as_mut().filter(|_| are_unique && names.len() > 1 && names.iter().all(is_name))
+        {
+            for (index, matrix) in self.arrays.iter().enumerate() {
+                let own: Vec<usize> = (0..columns.len()).filter(|column| self.columns[*column][0] == index).collect();
+                if own.len() == names.len() {
+                    is_used = true;
+                    own.iter()
+                        .zip(&names)
+                        .for_each(|(column, name)| columns[*column] = format!("{}[{name}]", matrix.name));
+                }
+            }
+        }
+        if !is_used {
+            self.notes.push(format!("{array}: {} texts, which do not name the columns of a matrix", names.len()));
+        }
+        self
     }
 
     pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {

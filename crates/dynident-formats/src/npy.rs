@@ -1,7 +1,7 @@
 //! NumPy: one array (`.npy`) or several of one length (`.npz`). Format:
 //! <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
 
-use crate::arrays::{Array, ArrayTable, MAX_COLUMNS};
+use crate::arrays::{Array, ArrayTable, EntryNames, MAX_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
@@ -12,6 +12,10 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 const MAX_HEADER_BYTES: usize = 1 << 20;
+/// Advice for the names of joints in an array with `dtype=object`.
+const OBJECTS_FIX: &str = "; if they name the joints, save them as text: numpy.array(names, dtype=str)";
+/// Names of arrays of texts that name the joints, and so the columns of the matrices.
+const NAMES_OF_JOINTS: [&str; 5] = ["joint_names", "joint_name", "joints", "names", "motor_names"];
 
 struct Header {
     /// Name (only in structured arrays), offset in an item, number of entries, and number type.
@@ -26,11 +30,28 @@ struct Field {
     name: Option<String>,
     offset: usize,
     number: Option<(Number, bool)>,
+    text: Option<TextKind>,
     count: usize,
 }
 
+/// Encoding of fixed-width text.
+#[derive(Clone, Copy)]
+enum TextKind {
+    Bytes,
+    Utf32 { big_endian: bool },
+}
+
+/// Contents of one `.npy` stream.
+enum Contents {
+    Numbers(Vec<Array>),
+    /// A vector of texts.
+    Texts(Vec<String>),
+    /// Python objects, which are never loaded.
+    Objects,
+}
+
 pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
-    let Some(arrays) = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)? else {
+    let Contents::Numbers(arrays) = contents(path, FileFormat::Npy, "", &mut reader, &mut budget)? else {
         return Err(nothing(path, FileFormat::Npy));
     };
     let named = arrays.iter().all(|array| !array.name.is_empty());
@@ -43,21 +64,31 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
     let mut file = dynident_files::open(path).map_err(io)?;
     let members = zip::members(path, &mut file)?;
     let (mut all, mut notes, mut found) = (Vec::new(), Vec::new(), 0);
+    let mut joints = None;
     for member in &members {
         let Some(name) = member.name.strip_suffix(".npy") else { continue };
         found += 1;
-        let mut contents = BufReader::new(zip::contents(path, &mut file, member)?);
-        let arrays = arrays(path, FileFormat::Npz, name, &mut contents, &mut budget);
+        let mut member = BufReader::new(zip::contents(path, &mut file, member)?);
+        let read = contents(path, FileFormat::Npz, name, &mut member, &mut budget);
+        let is_of_joints = NAMES_OF_JOINTS.contains(&name);
         // The checksum is checked first, because a wrong one explains other errors. An array that is too large is not
         // read to its end.
-        match arrays {
+        match read {
             Err(error @ FileError::Broken { fix: SPLIT_FIX, .. }) => return Err(error),
-            arrays => {
-                contents.into_inner().verify(path)?;
-                match arrays? {
-                    Some(arrays) if !arrays.is_empty() => all.extend(arrays),
-                    Some(_) => notes.push(format!("{name}: text, or more than two dimensions")),
-                    None => notes.push(format!("{name}: Python objects (pickle), which are never loaded")),
+            read => {
+                member.into_inner().verify(path)?;
+                match read? {
+                    Contents::Numbers(arrays) if !arrays.is_empty() => all.extend(arrays),
+                    Contents::Texts(texts) if is_of_joints && joints.is_none() => {
+                        joints = Some(EntryNames { array: name.to_owned(), names: texts });
+                    }
+                    Contents::Numbers(_) | Contents::Texts(_) => {
+                        notes.push(format!("{name}: text, or more than two dimensions"));
+                    }
+                    Contents::Objects => {
+                        let fix = if is_of_joints { OBJECTS_FIX } else { "" };
+                        notes.push(format!("{name}: Python objects (pickle), which are never loaded{fix}"));
+                    }
                 }
             }
         }
@@ -70,6 +101,7 @@ pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Ta
         });
     }
     let table = ArrayTable::new(all).ok_or_else(|| nothing(path, FileFormat::Npz))?;
+    let table = joints.into_iter().fold(table, ArrayTable::with_entry_names);
     Ok(Box::new(table.with_notes(notes)))
 }
 
@@ -79,18 +111,19 @@ fn nothing(path: &Path, format: FileFormat) -> FileError {
     FileError::no_columns(path, format, found, fix)
 }
 
-/// The numeric arrays in a `.npy` stream: one, or one for each field of a structured array; `None` for Python objects.
-fn arrays(
+/// The contents of a `.npy` stream: its numeric arrays (one, or one for each field of a structured array), or a vector
+/// of texts.
+fn contents(
     path: &Path,
     format: FileFormat,
     name: &str,
     reader: &mut impl Read,
     budget: &mut Budget,
-) -> Result<Option<Vec<Array>>, FileError> {
+) -> Result<Contents, FileError> {
     let place = if name.is_empty() { "the array".to_owned() } else { format!("array `{name}`") };
     let broken =
         |problem: String| FileError::broken(path, format, place.clone(), problem, "write it again with numpy.save");
-    let Some(header) = header(reader).map_err(&broken)? else { return Ok(None) };
+    let Some(header) = header(reader).map_err(&broken)? else { return Ok(Contents::Objects) };
     let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
     let bytes = items.and_then(|items| items.checked_mul(header.item));
     let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT_FIX);
@@ -113,6 +146,11 @@ fn arrays(
     read.map_err(|error| broken(format!("it cannot be decompressed ({error})")))?;
     if data.len() < bytes {
         return Err(broken(format!("only {} of {bytes} bytes are present: the file is truncated", data.len())));
+    }
+    if let ([Field { name: None, text: Some(kind), .. }], [_]) = (&header.fields[..], &header.shape[..])
+        && items <= MAX_COLUMNS
+    {
+        return Ok(Contents::Texts(data.chunks_exact(header.item).map(|item| kind.text(item)).collect()));
     }
     let mut arrays = Vec::new();
     for field in &header.fields {
@@ -138,7 +176,23 @@ fn arrays(
         let make = if column_major { Array::column_major } else { Array::row_major };
         arrays.push(make(label, [rows, columns], values));
     }
-    Ok(Some(arrays))
+    Ok(Contents::Numbers(arrays))
+}
+
+impl TextKind {
+    /// The text of an item, which is padded with zeros.
+    fn text(self, item: &[u8]) -> String {
+        let text: String = match self {
+            Self::Bytes => String::from_utf8_lossy(item).into_owned(),
+            Self::Utf32 { big_endian } => {
+                let mut codes = Bytes::new(item, big_endian);
+                core::iter::from_fn(|| codes.u32())
+                    .map(|code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER))
+                    .collect()
+            }
+        };
+        text.trim_end_matches('\0').to_owned()
+    }
 }
 
 /// The header of an array; `None` if its entries are Python objects.
@@ -196,7 +250,7 @@ fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
     match descr {
         Value::Text(kind) => {
             let (number, size) = scalar(kind)?;
-            Some((vec![Field { name: None, offset: 0, number, count: 1 }], size))
+            Some((vec![Field { name: None, offset: 0, number, text: text_kind(kind), count: 1 }], size))
         }
         Value::List(entries) => {
             let (mut fields, mut offset) = (Vec::new(), 0_usize);
@@ -217,7 +271,7 @@ fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
                 };
                 let count =
                     sides.iter().try_fold(1_usize, |all, side| all.checked_mul(usize::try_from(*side).ok()?))?;
-                fields.push(Field { name: Some(name.clone()), offset, number, count });
+                fields.push(Field { name: Some(name.clone()), offset, number, text: None, count });
                 offset = offset.checked_add(size.checked_mul(count)?)?;
             }
             (offset > 0).then_some((fields, offset))
@@ -248,6 +302,15 @@ fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
     };
     let bytes = if letter == "U" { size.checked_mul(4)? } else { size };
     (bytes > 0 && bytes <= 1 << 20).then_some((number.map(|number| (number, order == ">")), bytes))
+}
+
+/// The encoding of a text type such as `<U18` or `|S6`.
+fn text_kind(kind: &str) -> Option<TextKind> {
+    match (kind.get(..1)?, kind.get(1..2)?) {
+        (order, "U") => Some(TextKind::Utf32 { big_endian: order == ">" }),
+        (_, "S" | "a") => Some(TextKind::Bytes),
+        _ => None,
+    }
 }
 
 enum Value<'a> {

@@ -1,7 +1,7 @@
 //! Reads a robot from a URDF, MJCF, SDF or D-H table, distinguished by file name or content.
 
 use crate::dh::{DhError, read_dh};
-use crate::mjcf::{MjcfError, MjcfNotice, is_mjcf, read_mjcf_in};
+use crate::mjcf::{MjcfError, MjcfLoss, MjcfNotice, is_mjcf, read_mjcf_in};
 use crate::place::line_and_column;
 use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
@@ -46,6 +46,13 @@ pub struct Robot {
     pub notices: Vec<MjcfNotice>,
     /// Contents of an SDF that the model cannot represent.
     pub sdf_notices: Vec<SdfNotice>,
+}
+
+impl Robot {
+    /// Notices about a base that can move, although the model has it fixed. They restrict the logs that are valid.
+    pub fn losses_of_base(&self) -> impl Iterator<Item = &MjcfLoss> {
+        self.notices.iter().map(|notice| &notice.loss).filter(|loss| matches!(loss, MjcfLoss::FloatingBase { .. }))
+    }
 }
 
 /// Why a file could not be read as a robot. Every message begins with the file, and with line and column if known.

@@ -446,8 +446,12 @@ impl Study {
         if let Some(name) = &log.name {
             return name.clone();
         }
-        let file =
-            log.file.file_stem().map_or_else(|| log.file.display().to_string(), |s| s.to_string_lossy().into_owned());
+        // Digits after a dot belong to the name: a data set in a folder `speed_0.3`.
+        let is_extension =
+            |extension: &std::ffi::OsStr| extension.to_string_lossy().bytes().any(|byte| !byte.is_ascii_digit());
+        let has_extension = log.file.extension().is_some_and(is_extension);
+        let name = if has_extension { log.file.file_stem() } else { log.file.file_name() };
+        let file = name.map_or_else(|| log.file.display().to_string(), |name| name.to_string_lossy().into_owned());
         let file = log.part.iter().fold(file, |file, part| format!("{file} {part}"));
         if let Some([from, to]) = log.fraction {
             format!("{file} [{:.0} % .. {:.0} %]", 100.0 * from, 100.0 * to)

@@ -168,6 +168,12 @@ fn a_failure_of_xacro_is_reported() {
     for part in ["good.toml: arm.urdf: ", "(exit status: 3)", "no such \\u001b[31mpackage"] {
         assert!(outcome.stderr.contains(part), "{}", outcome.stderr);
     }
+    assert!(outcome.stderr.contains("correct the file or the arguments"), "{}", outcome.stderr);
+    let without_ros = self::folder("echo \"No module named 'ament_index_python'\" >&2; exit 2");
+    let outcome = run_in(without_ros.path(), &["inspect", "arm.urdf", "--allow-command"]);
+    for part in ["ament_index_python", "source the setup of your workspace", "robot_description > robot.urdf"] {
+        assert!(outcome.stderr.contains(part), "{}", outcome.stderr);
+    }
     let mut missing = with_xacro(folder.path(), &["inspect", "arm.urdf", "--allow-command"]);
     let output = missing.env("PATH", folder.path().join("nowhere")).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();

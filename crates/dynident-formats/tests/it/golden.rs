@@ -152,6 +152,18 @@ fn formats_are_detected_from_the_content() {
     }
 }
 
+/// Names of joints that are Python objects are reported with the fix.
+#[test]
+fn names_in_an_archive_name_its_columns() {
+    let notes = |file: &str| {
+        let Contents::Table(table) = open(&folder().join(file)).unwrap().contents else { panic!() };
+        table.notes()
+    };
+    assert!(notes("named.npz").is_empty() && notes("named_bytes.npz").is_empty());
+    let [note] = &notes("named_objects.npz")[..] else { panic!() };
+    assert!(note.starts_with("joint_names: Python objects") && note.contains("dtype=str"), "{note}");
+}
+
 /// Messages with time stamps in Protobuf have their clock, as those of ROS with a header.
 #[test]
 fn the_time_stamp_of_protobuf_is_the_clock() {

@@ -39,7 +39,8 @@ pub enum SdfFault {
     /// sdf -p`.
     #[error("there is no <model> here: give the SDF of one robot{hint}")]
     NoModel { hint: &'static str },
-    /// The file has several models or worlds, and Dynident cannot know which one is the robot. Delete the others.
+    /// The file has several worlds, several models with moving joints, or several models without any, and Dynident
+    /// cannot know which one is the robot. Delete the others.
     #[error("there are several {what}: keep that of the robot")]
     Several { what: &'static str },
     /// The model has more parts than any robot. It is probably a scene; give the file of the robot alone.

@@ -1,6 +1,7 @@
 //! SDF, the format of Gazebo: reading, and writing identified values back.
 //!
-//! Supported is one model (in `<sdf>` or in its single `<world>`) with nested models: links with `<inertial>`, joints
+//! Supported is one model (in `<sdf>` or in its single `<world>`) with nested models, next to static models without
+//! joints, such as a ground plane, which are left out: links with `<inertial>`, joints
 //! of type revolute, continuous, prismatic and fixed, poses and axes relative to any link, joint, frame or nested
 //! model, and gravity of the `<world>`. The frame semantics of files before version 1.7 are also supported. Links
 //! connected by fixed joints are merged into one body.
@@ -91,6 +92,9 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     let found = scopes(model, version)?;
     let frames = Frames::new(&found)?;
     let mut notices = notices::Notices::default();
+    for object in children(around, "model").filter(|other| *other != model) {
+        notices.note(object, SdfLoss::Object { model: word_of(object, "name")?.to_owned() });
+    }
     let tree = tree::tree(&found, &frames, &mut notices)?;
 
     // World gravity in the model's frame.
@@ -113,7 +117,7 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     Ok(SdfRobot { model, notices: notices.list })
 }
 
-/// The only model, and its parent element: the document or its world.
+/// The only model, or the only model with moving joints, and its parent element: the document or its world.
 fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Node<'a, 'input>), SdfError> {
     let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
     let around = match worlds[..] {
@@ -125,8 +129,20 @@ fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Nod
     match models[..] {
         [only] => Ok((around, only)),
         [] => Err(fault_at(around, SdfFault::NoModel { hint: include_hint(around) })),
-        [_, second, ..] => Err(fault_at(second, SdfFault::Several { what: "models" })),
+        [_, second, ..] => {
+            let moving: Vec<_> = models.iter().filter(|model| has_moving_joint(**model)).collect();
+            match moving[..] {
+                [only] => Ok((around, *only)),
+                [] => Err(fault_at(second, SdfFault::Several { what: "models" })),
+                [_, second, ..] => Err(fault_at(*second, SdfFault::Several { what: "models" })),
+            }
+        }
     }
+}
+
+/// Whether a model has a joint that is not fixed; the models of a scene, such as a ground plane, have none.
+fn has_moving_joint(model: Node<'_, '_>) -> bool {
+    model.descendants().any(|node| node.has_tag_name("joint") && node.attribute("type") != Some("fixed"))
 }
 
 fn include_hint(around: Node<'_, '_>) -> &'static str {

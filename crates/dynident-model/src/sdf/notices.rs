@@ -1,6 +1,7 @@
 //! Contents of a document that the model cannot represent.
 
 use super::line;
+use crate::audit::AuditLevel;
 use roxmltree::Node;
 use thiserror::Error;
 
@@ -33,9 +34,18 @@ pub enum SdfLoss {
     /// in the robot.
     #[error("the model at `{uri}` is not read: expand the file with `gz sdf -p`")]
     Include { uri: String },
+    /// A model without moving joints next to the robot, such as a ground plane, is not part of the robot. If the robot
+    /// is mounted on it, this has no effect on the torques. No action is needed.
+    #[error("model `{model}` has no moving joint: it is an object of the scene and is left out")]
+    Object { model: String },
 }
 
 impl SdfLoss {
+    /// Severity: information if the torques of the robot do not depend on the part.
+    pub fn level(&self) -> AuditLevel {
+        if matches!(self, Self::Object { .. }) { AuditLevel::Info } else { AuditLevel::Warning }
+    }
+
     /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
@@ -43,6 +53,7 @@ impl SdfLoss {
             Self::Weightless { .. } => "weightless",
             Self::AddedMass { .. } => "added-mass",
             Self::Include { .. } => "include",
+            Self::Object { .. } => "object",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! SDF: errors with place and fix, and notices. Dynamics are compared with Drake in dynident-dynamics.
 
 use crate::common::{assert_truncations_are_refused, mutate, mutations};
-use dynident_model::{DescriptionFormat, JointSpring, SdfLoss, audit, load_robot, read_sdf, write_urdf};
+use dynident_model::{AuditLevel, DescriptionFormat, JointSpring, SdfLoss, audit, load_robot, read_sdf, write_urdf};
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
 
@@ -102,6 +102,29 @@ fn unsupported_contents_give_notices() {
     assert_eq!(robot.model.joints()[0].spring, Some(JointSpring { stiffness: 3.0, reference: 0.0 }));
     let whole = read_sdf(&pendulum(INERTIAL, AXIS, "")).unwrap();
     assert!(whole.notices.is_empty(), "{:?}", whole.notices);
+}
+
+#[test]
+fn models_without_moving_joints_are_left_out() {
+    let whole = pendulum(INERTIAL, AXIS, "");
+    let alone = read_sdf(&whole).unwrap();
+    let ground = "<model name=\"ground\"><static>true</static><link name=\"plane\"/></model>";
+    let table = "<model name=\"table\"><link name=\"top\"/><link name=\"leg\"/>\
+                 <joint name=\"glue\" type=\"fixed\"><parent>top</parent><child>leg</child></joint></model>";
+    let robot = whole.replace("<sdf version=\"1.9\">", "").replace("</sdf>", "");
+    let world = |models: &str| format!("<sdf version=\"1.9\"><world name=\"w\">{models}</world></sdf>");
+    for models in [format!("{ground}{robot}{table}"), format!("{robot}{table}{ground}")] {
+        let read = read_sdf(&world(&models)).unwrap();
+        assert_eq!(read.model.parameter_vector(), alone.model.parameter_vector());
+        let mut said: Vec<String> = read.notices.iter().map(|notice| notice.loss.to_string()).collect();
+        said.sort();
+        assert!(said.len() == 2 && said[0].contains("model `ground`") && said[1].contains("model `table`"), "{said:?}");
+        assert!(read.notices.iter().all(|notice| notice.loss.level() == AuditLevel::Info));
+    }
+    // Two models that move: either could be the robot.
+    let second = robot.replace("name=\"p\"", "name=\"second\"");
+    let message = read_sdf(&world(&format!("{ground}{robot}{second}"))).unwrap_err().to_string();
+    assert!(message.contains("several models"), "{message}");
 }
 
 #[test]

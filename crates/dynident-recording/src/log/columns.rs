@@ -87,7 +87,9 @@ impl ColumnSelection {
                         second,
                     }),
                     (Some(first), None) => Ok(first),
-                    (None, _) => Err(unknown(name.clone(), existing_names(name, names))),
+                    (None, _) => {
+                        numbered_entry(name, names).ok_or_else(|| unknown(name.clone(), existing_names(name, names)))
+                    }
                 }
             }
         }
@@ -123,6 +125,22 @@ impl ColumnSelection {
     pub(super) fn label_of_slot(&self, slot: usize) -> String {
         column_label(self.table.names(), self.fields[slot])
     }
+}
+
+/// Index of a column such as `q[2]`: the third of the columns `q[..]`, if all of them have names in place of numbers.
+fn numbered_entry(requested: &str, names: &[String]) -> Option<usize> {
+    let (array, number) = split_entry(requested)?;
+    let number: usize = number.parse().ok()?;
+    let entries = names.iter().enumerate().filter_map(|(index, name)| Some((index, split_entry(name)?)));
+    let own: Vec<(usize, &str)> =
+        entries.filter(|(_, (of, _))| *of == array).map(|(index, (_, entry))| (index, entry)).collect();
+    let has_numbers = own.iter().any(|(_, entry)| entry.parse::<usize>().is_ok());
+    own.get(number).filter(|_| !has_numbers).map(|(index, _)| *index)
+}
+
+/// Splits `q[elbow]` into `q` and `elbow`.
+fn split_entry(name: &str) -> Option<(&str, &str)> {
+    name.strip_suffix(']')?.rsplit_once('[')
 }
 
 pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
@@ -171,6 +189,17 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_indices_of_named_entries() {
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let named = names(&["t", "q[pan]", "tau[pan]", "q[lift]", "tau[lift]"]);
+        let found =
+            ["q[0]", "q[1]", "tau[1]", "q[2]", "dq[0]", "q[elbow]", "t"].map(|name| numbered_entry(name, &named));
+        assert_eq!(found, [Some(1), Some(3), Some(4), None, None, None, None]);
+        // Columns that count from 1 have no column 0.
+        assert_eq!(numbered_entry("q[0]", &names(&["q[1]", "q[2]"])), None);
+    }
 
     #[test]
     fn edit_distance_is_the_number_of_edits() {

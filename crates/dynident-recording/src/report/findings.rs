@@ -137,7 +137,10 @@ impl ImportReport {
                 "import-backward-stamps",
                 Level::Problem,
                 "time",
-                format!("{} stamps are earlier than the one before", self.backward_stamps),
+                format!(
+                    "{} stamps are earlier than the one before: sort the rows by time, or select one part with `rows`",
+                    self.backward_stamps
+                ),
             );
         }
         if self.crowded_samples > 0 {

@@ -47,6 +47,27 @@ fn columns_follow_the_names_of_joints() {
     assert!(missing.contains("place[elbow]"), "{missing}");
 }
 
+/// Columns with names from `joint_names` of an archive also have the numbers of the matrix.
+#[test]
+fn columns_with_names_have_numbers_too() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../golden/formats");
+    let format = |[elbow, shoulder]: [&str; 2]| {
+        let list = |quantity: &str| format!("[\"{quantity}[{elbow}]\", \"{quantity}[{shoulder}]\"]");
+        format!("time.column = \"t\"\nposition.columns = {}\ntorque.columns = {}\n", list("q"), list("tau"))
+    };
+    // The shoulder is the first column.
+    let by_number = read(&golden.join("packed.npz"), &format(["1", "0"])).unwrap();
+    for names in [["1", "0"], ["elbow", "shoulder"]] {
+        assert_eq!(read(&golden.join("named.npz"), &format(names)).unwrap(), by_number, "{names:?}");
+    }
+    let by_pattern = "time.column = \"t\"\nposition.columns = \"q[{0..1}]\"\ntorque.columns = \"tau[{0..1}]\"\n";
+    let mut in_order = read(&golden.join("named.npz"), by_pattern).unwrap();
+    in_order.q.reverse();
+    assert_eq!(in_order.q, by_number.q);
+    let missing = read(&golden.join("named.npz"), &format(["2", "0"])).unwrap_err();
+    assert!(missing.contains("q[2]"), "{missing}");
+}
+
 #[test]
 fn one_row_in_n_is_kept() {
     let folder = tempfile::tempdir().unwrap();

@@ -56,6 +56,10 @@ pub enum XacroError {
     },
 }
 
+/// Parts of the messages of xacro if it cannot find a package of ROS: without ROS, and for an unknown package.
+const PACKAGE_FAILURES: [&str; 5] =
+    ["ament_index_python", "rospkg", "PackageNotFound", "package not found", "ResourceNotFound"];
+
 /// Suggests a fix for a failure.
 fn fix(failure: &RunError) -> &'static str {
     match failure {
@@ -63,6 +67,12 @@ fn fix(failure: &RunError) -> &'static str {
             "; install it (it comes with ROS, and as `pip install xacro`), or expand the file on another computer"
         }
         RunError::TimedOut { .. } => "; give it more time ([robot] xacro_limit_s, --xacro-limit-s)",
+        RunError::Failed { message, .. } if PACKAGE_FAILURES.iter().any(|part| message.contains(part)) => {
+            "; `$(find PACKAGE)` needs ROS: source the setup of your workspace in this terminal (`source \
+             install/setup.bash`) and repeat, or save the expanded description of the running robot (topic \
+             /robot_description) and give that file: `ros2 param get --hide-type /robot_state_publisher \
+             robot_description > robot.urdf`"
+        }
         RunError::Failed { .. } => "; correct the file or the arguments ([robot] xacro, --xacro)",
         _ => "",
     }

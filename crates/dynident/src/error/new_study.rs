@@ -17,15 +17,18 @@ pub enum NewStudyError {
         found: Vec<RecognisedFile>,
     },
     /// The log has position columns for more joints than the robot. The robot description is of another robot, or the
-    /// log also contains a gripper or an external axis. Give the matching description.
+    /// log also contains a gripper, a second arm or an external axis. Give the matching description, or write a study
+    /// with the columns of this robot.
     #[error(
-        "{columns} position columns, but the robot description has {joints} independent joints: check that it is the robot of this recording"
+        "{columns} position columns, but the robot description has {joints} independent joints: check that it is the robot of this recording; if the log also has other joints (second arm, gripper), write the study by hand (`dynident docs your-robot`) with the columns of this robot, probably `columns = {probable}` in [format.position], and those of torque or command likewise"
     )]
     MoreColumnsThanJoints {
         /// Number of position columns.
         columns: usize,
         /// Number of independent joints of the robot.
         joints: usize,
+        /// Columns that probably belong to the robot, in the notation of a study.
+        probable: String,
     },
 }
 

@@ -169,7 +169,7 @@ fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
         what: notice.loss.to_string(),
     }));
     entries.extend(robot.sdf_notices.iter().map(|notice| AuditEntry {
-        level: "warning".to_owned(),
+        level: notice.loss.level().name().to_owned(),
         check: notice.loss.name().to_owned(),
         place: format!("line {}", notice.line),
         what: notice.loss.to_string(),

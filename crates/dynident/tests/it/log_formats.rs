@@ -176,3 +176,12 @@ fn a_study_names_the_folder_of_a_recording() {
     // A folder without a recording.
     assert!(folders.find(Path::new("trace"), None).is_err());
 }
+
+/// A data set in a folder `speed_0.3` has this name; the extension of a file is left out.
+#[test]
+fn digits_after_a_dot_belong_to_the_name_of_a_log() {
+    let text = "robot.file = \"arm.urdf\"\nlog = [{ file = \"runs/speed_0.3\" }, { file = \"a.b.csv\" }]\n[format]\n\
+                rate_hz = 100.0\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }\n";
+    let study = dynident::Study::parse(text, std::path::Path::new("study.toml")).unwrap();
+    assert_eq!([study.log_name(0), study.log_name(1)], ["speed_0.3", "a.b"]);
+}

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const MARK: &str = "# UNSURE:";
 
 /// A file with this text and a line for each of [`rows`].
-fn file(folder: &Path, name: &str, before: &str, line: impl Fn(usize, [f64; 5]) -> String) -> PathBuf {
+pub(crate) fn file(folder: &Path, name: &str, before: &str, line: impl Fn(usize, [f64; 5]) -> String) -> PathBuf {
     let path = folder.join(name);
     let mut text = before.to_owned();
     for (row, values) in rows().into_iter().enumerate() {
@@ -33,7 +33,12 @@ fn columns(study: &Study) -> [String; 2] {
 
 /// The planar robot with a sliding finger.
 fn robot_with_finger(folder: &Path) -> PathBuf {
-    let path = robot(folder, ["joint1", "joint2"]);
+    robot_with_joints_and_finger(folder, ["joint1", "joint2"])
+}
+
+/// The planar robot with joints of these names and a sliding finger.
+pub(crate) fn robot_with_joints_and_finger(folder: &Path, names: [&str; 2]) -> PathBuf {
+    let path = robot(folder, names);
     let finger = r#"<joint name="finger.left" type="prismatic"><parent link="link2"/><child link="tip"/>
         <origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit effort="5" lower="0" upper="0.04" velocity="1"/></joint>
         <link name="tip"><inertial><mass value="0.1"/><inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/>

@@ -92,6 +92,7 @@ pub fn check_with(
         check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
     check.findings.extend(command_findings(&study, &robot, &sources, &thresholds.commands)?);
+    check.findings.extend(floating_base(&robot));
     check.findings.extend(impossible_bodies(&robot));
     check.findings.extend(too_few_rows(&examined, thresholds));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
@@ -119,6 +120,7 @@ fn check_commanded(
         ..StudyCheck::default()
     };
     check.findings.extend(bench_findings(study, &sources));
+    check.findings.extend(floating_base(robot));
     check.findings.extend(impossible_bodies(robot));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study.title(), check })
@@ -141,6 +143,20 @@ fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Opti
         write: Vec::new(),
         or: Vec::new(),
         code: "check-rows".to_owned(),
+    })
+}
+
+/// Warning that the base of the robot can move, although Dynident reads it as fixed.
+pub(super) fn floating_base(robot: &StudyRobot) -> Option<CheckFinding> {
+    let loss = robot.robot.losses_of_base().next()?;
+    Some(CheckFinding {
+        level: Level::Warning,
+        kind: "description".to_owned(),
+        what: loss.to_string(),
+        evidence: "a motion or an inclination of the base changes all torques".to_owned(),
+        write: Vec::new(),
+        or: Vec::new(),
+        code: "check-description".to_owned(),
     })
 }
 

@@ -305,7 +305,7 @@ fn split_compound(word: String) -> Vec<String> {
     parts.map_or_else(|| vec![word.clone()], |(first, second)| vec![first.to_owned(), second.to_owned()])
 }
 
-pub(super) fn is_quantity(word: &str) -> bool {
+pub(in crate::jobs) fn is_quantity(word: &str) -> bool {
     let lists: [&[&str]; 5] = [&POSITIONS, &VELOCITIES, &ACCELERATIONS, &TORQUES, &CURRENTS];
     lists.iter().any(|list| list.contains(&word))
 }

@@ -9,6 +9,11 @@ fn split_pattern(name: &str) -> (String, String) {
     if let Some((open, close)) = name.rfind('[').zip(name.rfind(']')).filter(|(open, close)| open < close) {
         return (format!("{}[{}", &name[..open], &name[close..]), name[open + 1..close].to_owned());
     }
+    split_number(name)
+}
+
+/// Splits a name at its last number: `a[joint_1.pos]` into `a[joint_{}.pos]` and `1`.
+fn split_number(name: &str) -> (String, String) {
     let Some(end) = name.rfind(|c: char| c.is_ascii_digit()) else { return (name.to_owned(), String::new()) };
     let begin = name[..=end]
         .rfind(|c: char| !c.is_ascii_digit())
@@ -37,10 +42,12 @@ fn columns(members: &[(String, String)]) -> String {
 
 /// Column names in study notation: a pattern if they differ by consecutive numbers, otherwise a list.
 pub(in crate::jobs) fn column_list(names: &[String]) -> String {
-    let parts: Vec<(String, String)> = names.iter().map(|name| split_pattern(name)).collect();
-    if parts.windows(2).all(|pair| pair[0].0 == pair[1].0) {
-        let members: Vec<_> = parts.into_iter().zip(names).map(|((_, own), name)| (own, name.clone())).collect();
-        return columns(&members);
+    for split in [split_number, split_pattern] {
+        let parts: Vec<(String, String)> = names.iter().map(|name| split(name)).collect();
+        if parts.windows(2).all(|pair| pair[0].0 == pair[1].0) {
+            let members: Vec<_> = parts.into_iter().zip(names).map(|((_, own), name)| (own, name.clone())).collect();
+            return columns(&members);
+        }
     }
     format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
 }
@@ -97,6 +104,8 @@ mod tests {
         let list = |names: &[&str]| column_list(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
         assert_eq!(list(&["q1_rad", "q2_rad"]), "\"q{1..2}_rad\"");
         assert_eq!(list(&["q[0]", "q[1]"]), "\"q[{0..1}]\"");
+        assert_eq!(list(&["x[left_1.pos]", "x[left_2.pos]"]), "\"x[left_{1..2}.pos]\"");
+        assert_eq!(list(&["x[j_2]", "x[j_1]"]), "[\"x[j_2]\", \"x[j_1]\"]");
         assert_eq!(list(&["x[pan]", "x[lift]"]), "[\"x[pan]\", \"x[lift]\"]");
     }
 

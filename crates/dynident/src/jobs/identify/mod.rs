@@ -8,7 +8,7 @@ mod sections;
 use crate::clock::now;
 use crate::error::Error;
 use crate::inputs::InputFiles;
-use crate::jobs::check::{CheckSettings, diagnosis_check};
+use crate::jobs::check::{CheckSettings, diagnosis_check, floating_base};
 use crate::jobs::differences::description_comparison;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::RunOptions;
@@ -371,10 +371,11 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
-        check: found
-            .diagnosis
-            .as_ref()
-            .map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis, &CheckSettings::default())),
+        check: found.diagnosis.as_ref().map(|diagnosis| {
+            let mut check = diagnosis_check(study, robot, &task.settings, diagnosis, &CheckSettings::default());
+            check.findings.extend(floating_base(robot));
+            check
+        }),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
         no_sdf: parts.no_sdf,

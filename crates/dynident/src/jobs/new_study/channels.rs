@@ -1,12 +1,10 @@
 //! Assigns the columns of a family to the robot's joints.
 
-use crate::jobs::columns::{Basis, Family, JointKey, words};
+use super::grippers::is_gripper;
+use crate::jobs::columns::{Basis, Family, JointKey, is_quantity, words};
 use crate::result::LogContents;
 use dynident_model::{JointKind, Model};
 use std::path::Path;
-
-/// Parts of the names of joints that are often logged as a percentage or share of their range.
-pub(super) const GRIPPERS: [&str; 4] = ["gripper", "jaw", "finger", "claw"];
 
 /// The joint of each column, and whether the assignment is certain.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -133,8 +131,9 @@ fn assigned(family: &Family, robot: &RobotJoints<'_>, left_out: &[String]) -> Op
 }
 
 /// The joint of each name whose words are part of the joint's name, or the reverse: `elbow` and `elbow_joint`.
-/// Otherwise the joint whose words begin with those of the name: `w1` and `wrist_1_joint`. `None` if a name matches
-/// no joint or several, or if two names match the same joint.
+/// Otherwise the joint whose words begin with those of the name: `w1` and `wrist_1_joint`. `joint_1` is `arm_joint1`
+/// rather than `arm_finger_joint1`, and `left_gripper` is the only gripper joint whose name contains `left`. `None` if
+/// a name matches no joint or several, or if two names match the same joint.
 fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
     let of_joints: Vec<Vec<String>> = robot.names.iter().map(|name| words(&name.to_lowercase())).collect();
     let contains = |all: &[String], part: &[String], is_like: fn(&String, &String) -> bool| {
@@ -153,9 +152,17 @@ fn by_words(names: &[&str], robot: &RobotJoints<'_>) -> Option<Vec<usize>> {
             let is_of = |joint: usize| {
                 contains(&of_joints[joint], &own, is_like) || contains(&own, &of_joints[joint], is_equal)
             };
-            let mut found = robot.free.iter().copied().filter(|&joint| is_of(joint));
-            match (found.next(), found.next()) {
-                (Some(joint), None) if !joints.contains(&joint) => joints.push(joint),
+            let is_of_kind = |joint: &usize| is_gripper(&robot.names[*joint]) == is_gripper(name);
+            let mut found: Vec<usize> = robot.free.iter().copied().filter(|&joint| is_of(joint)).collect();
+            if found.len() > 1 {
+                found.retain(is_of_kind);
+            } else if found.is_empty() && is_gripper(name) {
+                let side: Vec<&String> = own.iter().filter(|word| !is_gripper(word)).collect();
+                let has_side = |joint: &usize| side.iter().all(|word| of_joints[*joint].contains(word));
+                found.extend(robot.free.iter().filter(|joint| is_of_kind(joint) && has_side(joint)));
+            }
+            match found[..] {
+                [joint] if !joints.contains(&joint) => joints.push(joint),
                 _ => return None,
             }
         }
@@ -241,7 +248,7 @@ pub(super) fn with_numbered_names(
         JointKey::Number(_) => number,
         JointKey::Joint(_) | JointKey::Alone => false,
     };
-    let mut joined = all.to_vec();
+    let (mut joined, mut names) = (all.to_vec(), Vec::new());
     for named in all.iter().filter(|family| is(family, false)) {
         let own =
             |family: &&Family| kind(family) == kind(named) && is(family, true) && further(family, named).is_some();
@@ -262,13 +269,46 @@ pub(super) fn with_numbered_names(
         columns.sort_by_key(|(_, column)| place(column));
         joined.retain(|family| !numbered.contains(&family));
         joined.iter_mut().filter(|family| *family == named).for_each(|family| family.columns.clone_from(&columns));
+        names.extend(numbered.iter().filter_map(|family| Some((named.file, named.group, further(family, named)?))));
+    }
+    // The other quantities of the same joints get the same names: `joint1_effort` next to `joint1_pos`.
+    for (file, group, name) in names {
+        let is_like = |family: &&mut Family| {
+            let words: Vec<&str> = family.stem.split('_').filter(|word| !is_quantity(word)).collect();
+            (family.file, family.group) == (file, group) && is(family, true) && words.join("_") == name
+        };
+        for (key, _) in joined.iter_mut().filter(is_like).flat_map(|family| &mut family.columns) {
+            if let JointKey::Number(number) = key {
+                *key = JointKey::Name(format!("{name}{number}"));
+            }
+        }
     }
     joined
 }
 
+/// Omits the columns of joints that the robot description does not have, if the log has more columns than the robot
+/// joints, and each of the other columns has the name of a joint: the right arm next to the left arm.
+pub(super) fn without_other_arms(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
+    let mut all = all.to_vec();
+    for family in all.iter_mut().filter(|family| family.columns.len() > robot.free.len()) {
+        let name = |key: &JointKey| match key {
+            JointKey::Name(name) => Some(name.clone()),
+            JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+        };
+        let is_own = |(key, _): &&(JointKey, String)| name(key).is_some_and(|name| by_words(&[&name], robot).is_some());
+        let own: Vec<_> = family.columns.iter().filter(is_own).cloned().collect();
+        let names: Vec<String> = own.iter().filter_map(|(key, _)| name(key)).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        if !own.is_empty() && by_words(&names, robot).is_some() {
+            family.columns = own;
+        }
+    }
+    all
+}
+
 /// Omits the columns of grippers if the robot description has fewer joints than the log, and no gripper joint.
 pub(super) fn without_foreign_grippers(all: &[Family], robot: &RobotJoints<'_>) -> Vec<Family> {
-    let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if GRIPPERS.iter().any(|gripper| name.contains(gripper)));
+    let is_gripper = |(key, _): &(JointKey, String)| matches!(key, JointKey::Name(name) if is_gripper(name));
     let mut all = all.to_vec();
     for family in &mut all {
         if family.columns.len() > robot.free.len() && !family.columns.iter().all(is_gripper) {
@@ -298,6 +338,34 @@ pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Op
         let column = |joint: &usize| Some(family.columns.get(sorted.binary_search(joint).ok()?)?.1.clone());
         joints.iter().map(column).collect()
     })
+}
+
+/// The places of the joints with a column of `family`, if the family has columns for some of the joints only. Numbers
+/// must be those of the first joints, because others may count from another number. `None` if a column belongs to none
+/// of the joints.
+pub(super) fn partial_places(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<usize>> {
+    let has = |place: &usize| {
+        let keys = [&JointKey::Joint(joints[*place]), &logged.columns[*place].0];
+        family.columns.iter().any(|(key, _)| keys.contains(&key))
+    };
+    let places: Vec<usize> = (0..joints.len()).filter(has).collect();
+    let are_numbers = matches!(family.columns[0].0, JointKey::Number(_));
+    let are_first = !are_numbers || places.last() == Some(&(places.len() - 1));
+    (places.len() == family.columns.len() && places.len() < joints.len() && are_first).then_some(places)
+}
+
+/// The columns that a study of this robot could use, if the log has columns of more joints: those whose names begin
+/// like the name of the first one, or the first columns.
+pub(super) fn probable_columns(family: &Family, robot: &RobotJoints<'_>) -> Vec<String> {
+    let first_word = |key: &JointKey| match key {
+        JointKey::Name(name) => words(name).into_iter().next(),
+        JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+    };
+    let arm = first_word(&family.columns[0].0);
+    let alike: Vec<&(JointKey, String)> =
+        family.columns.iter().filter(|(key, _)| arm.is_some() && first_word(key) == arm).collect();
+    let own = if (1..=robot.free.len()).contains(&alike.len()) { alike } else { family.columns.iter().collect() };
+    own.into_iter().take(robot.free.len()).map(|(_, name)| name.clone()).collect()
 }
 
 /// Whether the columns of `family` have numbers and those of `logged` have joint names, so that the order of the

@@ -21,11 +21,42 @@ pub(super) struct Table {
     heading: String,
     reason: String,
     lines: Vec<Line>,
+    /// Names of the files of this recording, in a `format` of its own.
+    renamed: Option<RenamedFiles>,
+}
+
+/// Names of the files of one recording among several in one folder: `run_b_{joint}.csv` in place of
+/// `run_a_{joint}.csv`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct RenamedFiles {
+    /// Text before and after the joint in the file names of the first recording.
+    pub(super) first: [String; 2],
+    /// The same for this recording.
+    pub(super) own: [String; 2],
+}
+
+impl RenamedFiles {
+    /// The value of a key `file`, a text in quotes.
+    fn renamed(&self, file: &str) -> String {
+        let [before, after] = &self.first;
+        let inside = file.strip_prefix(&format!("\"{before}")).and_then(|rest| {
+            let (stem, extension) = rest.rsplit_once('.')?;
+            Some((stem.strip_suffix(after.as_str())?, extension))
+        });
+        let name = |(joint, extension): (&str, &str)| format!("\"{}{joint}{}.{extension}", self.own[0], self.own[1]);
+        inside.map_or_else(|| file.to_owned(), name)
+    }
 }
 
 impl Table {
     pub(super) fn new(heading: &str, reason: impl Into<String>) -> Self {
-        Self { heading: heading.to_owned(), reason: reason.into(), lines: Vec::new() }
+        Self { heading: heading.to_owned(), reason: reason.into(), lines: Vec::new(), renamed: None }
+    }
+
+    /// The table of a recording whose files have other names than those in `[format]`.
+    #[must_use]
+    pub(super) fn with_own_format(self, renamed: RenamedFiles) -> Self {
+        Self { renamed: Some(renamed), ..self }
     }
 
     #[must_use]
@@ -64,6 +95,30 @@ impl Draft {
         Self { tables }
     }
 
+    /// Adds a reason to a line of a table.
+    pub(super) fn explain(&mut self, heading: &str, key: &str, reason: &str) {
+        let tables = self.tables.iter_mut().filter(|table| table.heading == heading);
+        for line in tables.flat_map(|table| &mut table.lines).filter(|line| line.key == key) {
+            let separator = if line.reason.is_empty() { "" } else { "; " };
+            line.reason = format!("{}{separator}{reason}", line.reason);
+        }
+    }
+
+    /// The format of the study with the names of the files of one recording, as an inline table.
+    fn own_format(&self, renamed: &RenamedFiles) -> String {
+        let value = |line: &Line| {
+            let value = if line.key == "file" { renamed.renamed(&line.value) } else { line.value.clone() };
+            format!("{} = {value}", line.key)
+        };
+        let list = |table: &Table| table.lines.iter().map(value).collect::<Vec<_>>().join(", ");
+        let of_table = |table: &Table| match table.heading.trim_matches(['[', ']']).split_once('.') {
+            None if table.heading == "[format]" => Some(list(table)).filter(|list| !list.is_empty()),
+            Some(("format", group)) => Some(format!("{group} = {{ {} }}", list(table))),
+            _ => None,
+        };
+        format!("{{ {} }}", self.tables.iter().filter_map(of_table).collect::<Vec<_>>().join(", "))
+    }
+
     /// Applies a proposed change; returns false if the change is not a key or its table is missing.
     pub(super) fn apply(&mut self, change: &StudyChange, reason: &str) -> bool {
         let Some((key, value)) = change.line.split_once('=') else { return false };
@@ -96,11 +151,17 @@ impl Draft {
         let repeated = found.findings.iter().filter(|finding| finding.code == REPEATED_VALUES);
         let corrections = repeated.chain(problems.filter(is_discrete));
         let mut changed = false;
+        let mut is_reordered = false;
         for finding in corrections {
             for change in &finding.write {
                 let reason = format!("From `dynident check`: {}: {}", finding.what, finding.evidence);
-                changed |= self.apply(change, &reason);
+                let is_applied = self.apply(change, &reason);
+                is_reordered |= is_applied && finding.kind == "order";
+                changed |= is_applied;
             }
+        }
+        if is_reordered {
+            self.explain("[robot]", "joints", "then `dynident check` found another order of the columns (below)");
         }
         changed
     }
@@ -143,6 +204,13 @@ impl Draft {
                 }
                 let _ = writeln!(text, "{key} = {value}");
             }
+            if let Some(renamed) = &table.renamed {
+                let _ = writeln!(
+                    text,
+                    "# The files of this recording have other names: otherwise as under [format]\nformat = {}",
+                    self.own_format(renamed)
+                );
+            }
         }
         // The values come from several sources, all of which write TOML.
         toml_document(&text).into_owned()
@@ -166,5 +234,23 @@ mod tests {
         let text = draft.text();
         assert!(text.contains("# negative masses otherwise\nsign = -1\n"), "{text}");
         assert!(text.parse::<toml::Table>().is_ok() && draft.unsure().is_empty(), "{text}");
+    }
+
+    #[test]
+    fn a_recording_with_other_file_names_has_the_corrected_format() {
+        let file =
+            Table::new("[format.position]", "").with("file", "\"a_{joint}.csv\"", "").with("columns", "\"q\"", "");
+        let names = |run: &str| [format!("{run}_"), String::new()];
+        let second = RenamedFiles { first: names("a"), own: names("b") };
+        let log = Table::new("[[log]]", "").with("file", "\"b_pan.csv\"", "").with_own_format(second);
+        let time = Table::new("[format]", "").with("time", "{ column = \"t\" }", "");
+        let mut draft = Draft { tables: vec![time, file, log] };
+        let change = StudyChange { table: "format.position".to_owned(), line: "sign = [1, -1]".to_owned() };
+        assert!(draft.apply(&change, ""));
+        let text: toml::Table = draft.text().parse().unwrap();
+        let own = &text["log"][0]["format"];
+        assert_eq!(own["position"]["file"].as_str(), Some("b_{joint}.csv"));
+        assert_eq!(own["position"]["sign"], text["format"]["position"]["sign"]);
+        assert_eq!(own["time"], text["format"]["time"]);
     }
 }

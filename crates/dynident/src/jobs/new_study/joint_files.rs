@@ -1,5 +1,7 @@
-//! Recordings with one file for each joint, all with the same columns: `joint1.csv` to `joint7.csv`.
+//! Recordings with one file for each joint, all with the same columns: `joint1.csv` to `joint7.csv`. Each folder, or
+//! each group of files that differ in the joint only, is one recording: `run_a_elbow.csv` and `run_a_wrist.csv`.
 
+use super::draft::RenamedFiles;
 use crate::jobs::columns::{JointKey, Quantity, column_list, meaning};
 use crate::result::{LogChannel, LogContents};
 use dynident_text::quoted;
@@ -9,6 +11,9 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct JointFiles {
     columns: Vec<JointColumn>,
+    /// For each recording, the text before and after the joint in the names of its files; empty texts if it has all
+    /// files of its folder.
+    runs: Vec<[String; 2]>,
 }
 
 /// A column of a file of one joint.
@@ -27,9 +32,13 @@ pub(super) struct GroupColumns {
 }
 
 impl JointFiles {
-    /// Joins the files of each folder to one recording, whose columns are named by file and column. `None` if the files
-    /// do not have the same columns and number of rows, or more than one position each.
-    pub(super) fn join<'a>(logs: &[(&'a Path, LogContents)]) -> Option<(Self, Vec<(&'a Path, LogContents)>)> {
+    /// Joins the files of each recording, whose columns are named by file and column; `joints` are the names of the
+    /// robot's joints. `None` if the files of a recording do not have the same columns and number of rows, or more than
+    /// one position each.
+    pub(super) fn join<'a>(
+        logs: &[(&'a Path, LogContents)],
+        joints: &[String],
+    ) -> Option<(Self, Vec<(&'a Path, LogContents)>)> {
         let mut folders: Vec<Vec<&(&'a Path, LogContents)>> = Vec::new();
         for log in logs {
             match folders.iter_mut().find(|folder| folder[0].0.parent() == log.0.parent()) {
@@ -37,9 +46,16 @@ impl JointFiles {
                 None => folders.push(vec![log]),
             }
         }
+        let runs: Vec<Run<'_, 'a>> = folders.iter().flat_map(|files| runs_of_folder(files, joints)).collect();
         let mut columns = Vec::new();
-        let joined: Option<Vec<_>> = folders.iter().map(|files| of_folder(files, &mut columns)).collect();
-        Some((Self { columns }, joined?))
+        let joined: Option<Vec<_>> = runs.iter().map(|run| of_run(run, &mut columns)).collect();
+        Some((Self { columns, runs: runs.into_iter().map(|run| run.around).collect() }, joined?))
+    }
+
+    /// The names of the files of recording number `run`, if they differ from those of the first one.
+    pub(super) fn renamed(&self, run: usize) -> Option<RenamedFiles> {
+        let (first, own) = (self.runs.first()?, self.runs.get(run)?);
+        (first != own).then(|| RenamedFiles { first: first.clone(), own: own.clone() })
     }
 
     /// The file key and the column of `joined` columns of one quantity; `joints` are their joints. `None` if one text
@@ -66,11 +82,59 @@ impl JointFiles {
     }
 }
 
-/// One recording of the files of a folder.
-fn of_folder<'a>(
-    files: &[&(&'a Path, LogContents)],
-    columns: &mut Vec<JointColumn>,
-) -> Option<(&'a Path, LogContents)> {
+/// The files of one recording.
+struct Run<'l, 'a> {
+    /// Text before and after the joint in the names of the files; empty texts for all files of a folder.
+    around: [String; 2],
+    files: Vec<&'l (&'a Path, LogContents)>,
+}
+
+/// The recordings in a folder. The files of a recording differ in the name of the joint, or otherwise in the last
+/// number of their names. All files are one recording, if a group would be a single file.
+fn runs_of_folder<'l, 'a>(files: &[&'l (&'a Path, LogContents)], joints: &[String]) -> Vec<Run<'l, 'a>> {
+    let splits: [&dyn Fn(&str) -> Option<[String; 2]>; 2] = [&|stem: &str| around_joint(stem, joints), &around_number];
+    for split in splits {
+        let stem = |path: &Path| path.file_stem()?.to_str().map(str::to_owned);
+        let around: Option<Vec<[String; 2]>> = files.iter().map(|(path, _)| split(&stem(path)?)).collect();
+        let Some(around) = around else { continue };
+        let mut runs: Vec<Run<'l, 'a>> = Vec::new();
+        for (around, file) in around.into_iter().zip(files.iter().copied()) {
+            match runs.iter_mut().find(|run| run.around == around) {
+                Some(run) => run.files.push(file),
+                None => runs.push(Run { around, files: vec![file] }),
+            }
+        }
+        if runs.len() > 1 && runs.iter().all(|run| run.files.len() > 1) {
+            return runs;
+        }
+        break;
+    }
+    vec![Run { around: [String::new(), String::new()], files: files.to_vec() }]
+}
+
+/// The text before and after the longest joint name in `stem` that is a separate word.
+fn around_joint(stem: &str, joints: &[String]) -> Option<[String; 2]> {
+    let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    let split = |joint: &String| {
+        let is_word = |(at, _): &(usize, &str)| {
+            !is_part(stem[..*at].chars().next_back()) && !is_part(stem[*at + joint.len()..].chars().next())
+        };
+        let (at, _) = stem.match_indices(joint.as_str()).filter(is_word).last()?;
+        Some((joint.len(), [stem[..at].to_owned(), stem[at + joint.len()..].to_owned()]))
+    };
+    let found = joints.iter().filter(|joint| !joint.is_empty()).filter_map(split);
+    found.max_by_key(|(length, _)| *length).map(|(_, around)| around)
+}
+
+/// The text before and after the last number in `stem`.
+fn around_number(stem: &str) -> Option<[String; 2]> {
+    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let begin = stem[..end].trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    Some([stem[..begin].to_owned(), stem[end..].to_owned()])
+}
+
+/// The recording of the files of a run.
+fn of_run<'a>(Run { around, files }: &Run<'_, 'a>, columns: &mut Vec<JointColumn>) -> Option<(&'a Path, LogContents)> {
     let (path, first) = (files[0].0, &files[0].1);
     let names = |log: &LogContents| log.channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>();
     let is_like = |(_, log): &&&(&Path, LogContents)| {
@@ -92,7 +156,8 @@ fn of_folder<'a>(
         first.channels.iter().filter(|channel| Some(channel.name.as_str()) == time).cloned().collect();
     for (path, log) in files {
         let file = path.file_name()?.to_str()?;
-        let stem = path.file_stem()?.to_str()?;
+        // The part that is the same for all runs.
+        let stem = path.file_stem()?.to_str()?.strip_prefix(around[0].as_str())?.strip_suffix(around[1].as_str())?;
         for channel in log.channels.iter().filter(|channel| Some(channel.name.as_str()) != time) {
             let joined = format!("{stem}/{}", channel.name);
             channels.push(LogChannel { name: joined.clone(), ..channel.clone() });
@@ -112,7 +177,18 @@ mod tests {
             file: (*file).to_owned(),
             column: (*column).to_owned(),
         };
-        JointFiles { columns: list.iter().map(column).collect() }
+        JointFiles { columns: list.iter().map(column).collect(), runs: Vec::new() }
+    }
+
+    #[test]
+    fn the_joint_in_a_file_name_is_found() {
+        let joints = ["joint", "elbow_joint"].map(str::to_owned);
+        let around = |before: &str, after: &str| Some([before.to_owned(), after.to_owned()]);
+        assert_eq!(around_joint("a_elbow_joint_raw", &joints), around("a_", "_raw"));
+        assert_eq!(around_joint("joint_a", &joints), around("", "_a"));
+        assert_eq!(around_joint("joint2_a", &joints), None);
+        assert_eq!(around_number("run2_axis12_x"), around("run2_axis", "_x"));
+        assert_eq!(around_number("axis"), None);
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! Joints in a log that are locked: joints that stand still, and joints of another publisher.
+//! Joints in a log that are locked: joints that stand still, joints of another publisher, joints without torque, and
+//! grippers whose positions have no unit.
 
-use crate::jobs::columns::{Family, JointKey};
+use super::channels::{RobotJoints, in_order, partial_places};
+use crate::jobs::columns::{Family, JointKey, Quantity, is_unsigned};
 use crate::result::LogContents;
 use std::path::Path;
 
@@ -25,6 +27,56 @@ impl LockedJoint {
         };
         Self { joint, column: column.to_owned(), reason, is_sure: !carries }
     }
+
+    /// A joint with a position and without a torque, next to joints with torques.
+    pub(super) fn without_torque(joint: usize, column: &str, is_still: bool, is_gripper: bool) -> Self {
+        let reason = if is_still || is_gripper {
+            "the recordings have no torque of it, so it is locked in the middle of its recorded positions"
+        } else {
+            "the recordings have no torque of it, so it is locked in the middle of its recorded positions, although it moves"
+        };
+        Self { joint, column: column.to_owned(), reason, is_sure: is_still || is_gripper }
+    }
+
+    /// A gripper that is logged as a share of its range.
+    pub(super) fn share(joint: usize, column: &str) -> Self {
+        let reason = "its positions exceed its limits in m (mm) and rad (deg): probably a share of its range, so it is locked in the middle of its recorded positions";
+        Self { joint, column: column.to_owned(), reason, is_sure: false }
+    }
+}
+
+/// The recorded torques and currents with signs in the file of the positions, or in a file with the same number of
+/// rows.
+pub(super) fn recorded_torques(all: &[Family], position: &Family, logs: &[(&Path, LogContents)]) -> Vec<Family> {
+    let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
+    let is_recorded = |family: &&Family| {
+        matches!(family.quantity, Quantity::Torque | Quantity::Current)
+            && family.source.is_recorded()
+            && (family.file == position.file || rows(family) == rows(position))
+            && !is_unsigned(family, &logs[family.file].1)
+    };
+    all.iter().filter(is_recorded).cloned().collect()
+}
+
+/// The places of the joints with torque, if none of `torques` has columns for all `joints`. The other joints, such as a
+/// gripper, must not carry them and be fewer. `None` otherwise.
+pub(super) fn places_with_torque(
+    torques: &[Family],
+    position: &Family,
+    joints: &[usize],
+    robot: &RobotJoints<'_>,
+) -> Option<Vec<usize>> {
+    if torques.iter().any(|family| in_order(family, position, joints).is_some()) {
+        return None;
+    }
+    let is_beyond = |places: &Vec<usize>| {
+        let mut carriers = places.iter().filter_map(|place| robot.carriers.get(joints[*place])).flatten();
+        let is_other =
+            |joint: &usize| joints.iter().position(|own| own == joint).is_some_and(|at| !places.contains(&at));
+        2 * places.len() > joints.len() && !carriers.any(is_other)
+    };
+    let of_torques = torques.iter().filter_map(|family| partial_places(family, position, joints));
+    of_torques.filter(is_beyond).max_by_key(Vec::len)
 }
 
 /// The range of a column in all recordings.

@@ -3,8 +3,10 @@
 mod channels;
 mod draft;
 mod drives;
+mod grippers;
 mod joint_files;
 mod locked;
+mod normalised;
 mod position_units;
 mod reasons;
 mod recognised;
@@ -24,6 +26,7 @@ use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::Robot;
 use dynident_recording::Level;
 use joint_files::JointFiles;
+use position_units::PositionUnits;
 use recognised::RecognisedColumns;
 use std::path::{Path, PathBuf};
 
@@ -91,7 +94,8 @@ pub fn new_study_with(
         }
     }
     let find = |logs: &[(&Path, LogContents)]| RecognisedColumns::find(&robot.model, logs, thresholds);
-    let of_joints = JointFiles::join(&logs).and_then(|(files, joined)| {
+    let names: Vec<String> = robot.model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let of_joints = JointFiles::join(&logs, &names).and_then(|(files, joined)| {
         let recorded = RecognisedColumns { joint_files: Some(files), ..find(&joined).ok()? };
         recorded.has_file_pattern(&robot.model).then_some((recorded, joined))
     });
@@ -103,15 +107,22 @@ pub fn new_study_with(
         None => RecognisedColumns { parts, ..find(&logs).map_err(Error::NewStudy)? },
     };
     let mut draft = recorded.draft(request, &robot.model, &logs);
+    for loss in robot.losses_of_base() {
+        draft.explain("[robot]", "file", &loss.to_string());
+    }
+    let may_be_normalised = PositionUnits::of(&recorded, &robot.model, &logs).may_be_normalised();
     for change in &request.stated {
         draft.apply(change, "As stated");
     }
 
     let mut unsure = draft.unsure();
     unsure.extend(recorded.unused_recordings(&logs));
-    let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
-    let examined =
-        if unsure.iter().any(without_rate) { None } else { corrected(request, options, &mut draft, &mut unsure)? };
+    // No correction is reliable without the sample rate and the unit of the positions.
+    let is_unknown = |change: &StudyChange| {
+        change.line.starts_with("rate_hz") || may_be_normalised && change.line.starts_with("unit")
+    };
+    let has_unknown = unsure.iter().filter_map(|unsure| unsure.line.as_ref()).any(is_unknown);
+    let examined = if has_unknown { None } else { corrected(request, options, &mut draft, &mut unsure)? };
     let remaining = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
     unsure.extend(remaining.map(|finding| Unsure {
         line: None,

@@ -1,8 +1,9 @@
 //! Units of positions and commands whose names contain no unit, and grippers that are logged as a share of their
 //! range.
 
-use super::channels::GRIPPERS;
 use super::draft::Table;
+use super::grippers::{DEGREE, Share, share_of_range};
+use super::normalised::{LoggedRange, Normalised, are_thousandths};
 use super::recognised::RecognisedColumns;
 use crate::jobs::columns::Family;
 use crate::result::LogContents;
@@ -10,19 +11,11 @@ use dynident_model::{JointKind, Model};
 use dynident_text::quoted;
 use std::path::Path;
 
-/// Logged position of an open gripper, if it is logged as a share of its range: 1, or 100 for percent.
-const FULL_RANGES: [f64; 2] = [1.0, 100.0];
-/// Largest amount by which a logged share can exceed the full range, as a part of the full range.
-const MAX_EXCESS: f64 = 0.1;
-
 /// A gripper that is logged as a share of its range.
 struct Gripper {
     /// Index of its column.
     place: usize,
-    /// Value of the full range in the log: 1 or 100.
-    full: f64,
-    /// Position limits, rad or m.
-    limits: [f64; 2],
+    share: Share,
 }
 
 /// Units of positions and commands that follow from their values.
@@ -34,6 +27,10 @@ pub(super) struct PositionUnits {
     /// For each column, the largest position of a prismatic joint.
     travel: Vec<Option<f64>>,
     max_travel_m: f64,
+    /// The note about LeRobot's normalised positions, if the positions may be such.
+    normalised: Option<String>,
+    /// Factor on the unit: 0.001 if the positions are probably in 0.001 degree, otherwise 1.
+    factor: f64,
 }
 
 impl PositionUnits {
@@ -55,20 +52,10 @@ impl PositionUnits {
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [from, to]| [low.min(from), high.max(to)])
         };
         let gripper = |place: usize| {
-            let joint = &model.joints()[joints[place]];
-            let is_named = GRIPPERS.iter().any(|name| joint.name.to_lowercase().contains(name));
-            let limits = [joint.limits.lower?, joint.limits.upper?];
             let [low, high] = ranges(place);
-            let is_share = |full: &f64| low >= -MAX_EXCESS * full && high <= (1.0 + MAX_EXCESS) * full;
-            let full = FULL_RANGES.into_iter().find(is_share)?;
+            let share = share_of_range(&model.joints()[joints[place]], [low, high])?;
             // Positions between the limits can be radians, except those from 0 to 1.
-            let is_inside = low >= limits[0] && high <= limits[1];
-            let is_unit_share = full == FULL_RANGES[0] && low >= 0.0;
-            (is_named && limits[0] < limits[1] && (!is_inside || is_unit_share)).then_some(Gripper {
-                place,
-                full,
-                limits,
-            })
+            (!share.is_inside || share.is_of_one() && low >= 0.0).then_some(Gripper { place, share })
         };
         let gripper = (0..joints.len()).find_map(|place| gripper(place).filter(|_| recognised.has_commands()));
         let is_turning = |place: &usize| {
@@ -89,13 +76,36 @@ impl PositionUnits {
             let [low, high] = ranges(place);
             is_prismatic(place).then(|| high.max(-low))
         });
+        let implausible = (most > limit).then_some(most);
+        let logged = |place: usize| {
+            let joint = &model.joints()[joints[place]];
+            let limits = joint.limits.lower.zip(joint.limits.upper).map(|(lower, upper)| [lower, upper]);
+            let of_files = recognised.files.iter().filter_map(|&file| range(&positions[place], file));
+            let range = of_files.fold(ranges(place), |[low, high], [from, to]| [low.min(from), high.max(to)]);
+            LoggedRange { joint: joint.name.clone(), range, limits, is_turning: is_turning(&place) }
+        };
+        let logged: Vec<LoggedRange> = (0..joints.len()).map(logged).collect();
+        let is_unstated = implausible.is_some() && recognised.position.unit.is_none();
+        let normalised = is_unstated.then(|| Normalised::find(&logged, positions)).flatten();
         Self {
             columns: joints.len(),
+            normalised: normalised.map(|found| found.note(&logged)),
+            factor: if is_unstated && are_thousandths(&logged) { 1e-3 } else { 1.0 },
             travel: travel.collect(),
             max_travel_m: recognised.thresholds.max_travel_m,
-            implausible: (most > limit).then_some(most),
+            implausible,
             gripper,
         }
+    }
+
+    /// Whether the positions may be LeRobot's normalised ones, so that corrections of other units are misleading.
+    pub(super) fn may_be_normalised(&self) -> bool {
+        self.normalised.is_some()
+    }
+
+    /// Factor on the unit of a joint that is not among the columns.
+    pub(super) fn factor_of_joint(&self, kind: JointKind) -> f64 {
+        if kind == JointKind::Prismatic { 1.0 } else { self.factor }
     }
 
     /// Whether the positions are probably in degrees; `stated` is the unit in their names.
@@ -103,10 +113,16 @@ impl PositionUnits {
         stated == Some("deg") || stated.is_none() && self.implausible.is_some()
     }
 
-    /// Unit of a joint that is not among the columns.
-    pub(super) fn unit_of_joint(&self, kind: JointKind, stated: Option<&'static str>) -> &'static str {
+    /// Unit of a joint with the positions from `low` to `high` that is not among the columns.
+    pub(super) fn unit_of_joint(
+        &self,
+        kind: JointKind,
+        stated: Option<&'static str>,
+        [low, high]: [f64; 2],
+    ) -> &'static str {
         match (stated, kind) {
             (Some(unit), _) => unit,
+            (None, JointKind::Prismatic) if high.max(-low) > self.max_travel_m => "mm",
             (None, JointKind::Prismatic) => "m",
             (None, _) if self.implausible.is_some() => "deg",
             (None, _) => "rad",
@@ -122,9 +138,16 @@ impl PositionUnits {
             }
             (_, Some(_)) => ("m", None),
             (None, None) => self.implausible.map_or(("rad", None), |most| {
-                let reason = format!(
-                    "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
-                );
+                let reason = if self.factor == 1.0 {
+                    let normalised = self.normalised.iter().fold(String::new(), |text, note| text + "; " + note);
+                    format!(
+                        "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions{normalised}"
+                    )
+                } else {
+                    format!(
+                        "a joint moves to {most:.1}, which is implausible in radians and degrees, but 0.001 degree per unit (as in the SDK of the Piper) fits the limits of all joints: scale = 0.001; counts of an encoder are possible too"
+                    )
+                };
                 ("deg", Some(reason))
             }),
         }
@@ -145,8 +168,10 @@ impl PositionUnits {
             let reason = doubt.clone().unwrap_or_else(|| "by the names".to_owned());
             table.with_line("unit", one_or_list(&names), reason, doubt.is_none())
         };
-        let Some(Gripper { place, full, limits: [low, high] }) = &self.gripper else { return table };
-        let unit = if self.are_degrees(stated) { core::f64::consts::PI / 180.0 } else { 1.0 };
+        let Some(Gripper { place, share: Share { full, limits: [low, high], .. } }) = &self.gripper else {
+            return self.with_factor(table);
+        };
+        let unit = if self.are_degrees(stated) { DEGREE } else { 1.0 };
         let list = |usual: f64, own: f64| {
             let values = (0..self.columns).map(|column| if column == *place { own } else { usual });
             format!("[{}]", values.map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", "))
@@ -154,7 +179,18 @@ impl PositionUnits {
         let reason = format!(
             "the gripper is logged from 0 to {full}, probably a share of its range: mapped to the limits of the robot description"
         );
-        table.with_unsure("scale", list(1.0, (high - low) / full / unit), reason).with("offset", list(0.0, *low), "rad")
+        let scale = list(self.factor, (high - low) / full / unit);
+        table.with_unsure("scale", scale, reason).with("offset", list(0.0, *low), "rad")
+    }
+
+    /// Returns `table` with the factor on the unit of revolute joints.
+    fn with_factor(&self, table: Table) -> Table {
+        if self.factor == 1.0 {
+            return table;
+        }
+        let factors = self.travel.iter().map(|travel| if travel.is_some() { 1.0 } else { self.factor });
+        let factors: Vec<String> = factors.map(|factor| format!("{factor:?}")).collect();
+        table.with("scale", format!("[{}]", factors.join(", ")), "0.001 degree, as stated for `unit`")
     }
 }
 

@@ -1,18 +1,23 @@
 //! The columns that a study uses, among all columns of its recordings.
 
 use super::channels::{
-    LoggedJoints, RobotJoints, in_order, logged_joints, with_numbered_names, with_partly_foreign_names,
-    without_foreign_grippers,
+    LoggedJoints, RobotJoints, in_order, logged_joints, probable_columns, with_numbered_names,
+    with_partly_foreign_names, without_foreign_grippers, without_other_arms,
 };
+use super::draft::RenamedFiles;
+use super::grippers::{is_gripper, unclear_gripper};
 use super::joint_files::JointFiles;
-use super::locked::{LockedJoint, is_of_other_publisher, still_places, without_other_publisher};
+use super::locked::{
+    LockedJoint, is_of_other_publisher, places_with_torque, range, recorded_torques, still_places,
+    without_other_publisher,
+};
 use super::reasons::{alternatives, recognised};
 use super::settings::NewStudySettings;
 use crate::error::NewStudyError;
 use crate::jobs::columns::{
-    Basis, Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, equal_choice, families,
-    families_by_order, families_without_quantity, is_unsigned, shown, time_as_toml, time_unit_s, unit as unit_of_name,
-    with_unit,
+    Basis, Family, JointKey, Quantity, Source, best, best_command, best_next_to, best_torque, column_list,
+    equal_choice, families, families_by_order, families_without_quantity, is_unsigned, shown, time_as_toml,
+    time_unit_s, unit as unit_of_name, with_unit,
 };
 use crate::result::{LogContents, Unsure};
 use dynident_model::Model;
@@ -44,6 +49,8 @@ pub(super) struct RecognisedColumns {
     pub(super) equals: [Option<String>; 2],
     /// Number of rows per row with values in all columns.
     pub(super) rows_of_complete_one: f64,
+    /// Signed torques or currents of some joints, in a study with commands.
+    pub(super) unused_torque: Option<String>,
 }
 
 /// The clock of the recordings.
@@ -171,7 +178,7 @@ impl RecognisedColumns {
         let paths = || logs.iter().map(|(path, log)| (*path, log));
         let counts = [robot.free.len(), robot.turning.len()];
         let joined = joined_families(logs, &robot, counts);
-        let mut all = without_foreign_grippers(&joined, &robot);
+        let mut all = without_foreign_grippers(&without_other_arms(&joined, &robot), &robot);
         let missing =
             |quantity, all: &[Family]| NewStudyError::NotRecognised { quantity, found: recognised(all, logs) };
         // Columns with unknown names, one for each joint.
@@ -183,16 +190,43 @@ impl RecognisedColumns {
             assume(&mut all, Quantity::Position);
         }
         let found = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions", &all))?.clone();
-        let (position, apart) = without_other_publisher(found.clone(), &logs[found.file].1);
+        let (position, mut apart) = without_other_publisher(found.clone(), &logs[found.file].1);
         all.iter_mut()
             .filter(|family| **family == found)
             .for_each(|family| family.columns.clone_from(&position.columns));
         let position = &position;
         let left_out = names_of_same_kind(&joined, position, &logs[position.file].1);
-        let logged = logged_joints(position, &robot, &left_out).ok_or(NewStudyError::MoreColumnsThanJoints {
-            columns: position.columns.len(),
-            joints: robot.free.len(),
-        })?;
+        let logged =
+            logged_joints(position, &robot, &left_out).ok_or_else(|| NewStudyError::MoreColumnsThanJoints {
+                columns: position.columns.len(),
+                joints: robot.free.len(),
+                probable: column_list(&probable_columns(position, &robot)),
+            })?;
+        let logged = with_unread_names(logged, position, &logs[position.file].1);
+
+        // Torques of some joints only: the others are locked.
+        let recorded = recorded_torques(&all, position, logs);
+        let places = places_with_torque(&recorded, position, &logged.joints, &robot);
+        let with_torque = places.map(|places| {
+            let is_kept = |place: &usize| places.contains(place);
+            let (kept, others): (Vec<usize>, Vec<usize>) = (0..logged.joints.len()).partition(is_kept);
+            let width = |column: &str| range(logs, column).map_or(0.0, |[low, high]| high - low);
+            let widths = position.columns.iter().map(|(_, column)| width(column));
+            let most = thresholds.max_still_share * widths.fold(0.0, f64::max);
+            let lock = |place: &usize| {
+                let (joint, column) = (logged.joints[*place], &position.columns[*place].1);
+                LockedJoint::without_torque(joint, column, width(column) <= most, is_gripper(&robot.names[joint]))
+            };
+            apart.extend(others.iter().map(lock));
+            let columns = kept.iter().map(|place| position.columns[*place].clone()).collect();
+            let joints = kept.iter().map(|place| logged.joints[*place]).collect();
+            (Family { columns, ..position.clone() }, LoggedJoints { joints, ..logged.clone() })
+        });
+        if let Some((shortened, _)) = &with_torque {
+            all.iter_mut().filter(|family| **family == *position).for_each(|family| family.clone_from(shortened));
+        }
+        let (position, logged) =
+            with_torque.as_ref().map_or((position, &logged), |(position, logged)| (position, logged));
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 
         // The columns are searched in the file of the positions, and otherwise in another file with the same number
@@ -226,12 +260,22 @@ impl RecognisedColumns {
         let own = |file: usize| if drive.file == position.file { logs } else { &logs[file..=file] };
         let quantities = [(own(position.file), &of_position[..]), (own(drive.file), &of_drive)];
         let still = still_places(quantities, thresholds.max_still_share);
-        let carries = |joint: usize| robot.carries_moving(joint, &logged.joints, &still);
-        let locked = still.iter().map(|&place| {
+        let is_torque = drive.quantity != Quantity::Position;
+        let is_share = |place: &usize| {
+            let (joint, column) = (&model.joints()[logged.joints[*place]], &of_position[*place]);
+            let range = range(own(position.file), column).filter(|_| is_torque && position.unit_of(column).is_none());
+            !still.contains(place) && range.is_some_and(|range| unclear_gripper(joint, range).is_some())
+        };
+        let shares: Vec<usize> = (0..logged.joints.len()).filter(is_share).collect();
+        let still: Vec<usize> = still.into_iter().chain(shares.iter().copied()).collect();
+        let place_of = |place: usize| {
             let joint = logged.joints[place];
-            LockedJoint::still(joint, &of_position[place], carries(joint))
-        });
-        let locked: Vec<LockedJoint> = locked.chain(apart).collect();
+            if shares.contains(&place) {
+                return LockedJoint::share(joint, &of_position[place]);
+            }
+            LockedJoint::still(joint, &of_position[place], robot.carries_moving(joint, &logged.joints, &still))
+        };
+        let locked: Vec<LockedJoint> = still.iter().map(|place| place_of(*place)).chain(apart).collect();
         let moving = |columns: &[String]| -> Vec<String> {
             let places = columns.iter().enumerate().filter(|(place, _)| !still.contains(place));
             places.map(|(_, name)| name.clone()).collect()
@@ -259,6 +303,7 @@ impl RecognisedColumns {
             alternatives,
             equals,
             rows_of_complete_one,
+            unused_torque: recorded.first().filter(|_| !is_torque).map(named),
         })
     }
 
@@ -273,8 +318,31 @@ impl RecognisedColumns {
         unused.map(|(_, (path, _))| Unsure { line: None, proposed: Vec::new(), reason: reason(path) }).collect()
     }
 
+    /// Files of the recording number `log` with one file for each joint, if they have other names than those of the
+    /// first recording.
+    pub(super) fn renamed_files(&self, log: usize) -> Option<RenamedFiles> {
+        self.joint_files.as_ref().and_then(|files| files.renamed(log))
+    }
+
     /// Whether the log has commanded positions instead of torques.
     pub(super) fn has_commands(&self) -> bool {
         self.drive.quantity == Quantity::Position
+    }
+}
+
+/// Adds a doubt if the file has names of the joints that are not readable, and the columns have numbers only.
+fn with_unread_names(logged: LoggedJoints, position: &Family, contents: &LogContents) -> LoggedJoints {
+    let is_of_names = |note: &&String| {
+        let array = note.split_once(':').map_or("", |(array, _)| array);
+        array.contains("name") && note.contains("Python objects")
+    };
+    let has_numbers = matches!(position.columns[0].0, JointKey::Number(_));
+    match contents.notes.iter().find(is_of_names).filter(|_| has_numbers) {
+        Some(note) => {
+            let reason =
+                format!("{}; the order may be another one, because names are not readable: {note}", logged.reason);
+            LoggedJoints { reason, is_sure: false, ..logged }
+        }
+        None => logged,
     }
 }

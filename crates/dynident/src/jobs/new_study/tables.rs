@@ -3,6 +3,7 @@
 use super::NewStudy;
 use super::channels::{LoggedJoints, is_numbered_next_to_names};
 use super::draft::{Draft, Table};
+use super::grippers::unclear_gripper;
 use super::joint_files::GroupColumns;
 use super::locked::{LockedJoint, range};
 use super::position_units::{PositionUnits, one_or_list};
@@ -81,17 +82,28 @@ impl RecognisedColumns {
         let units = PositionUnits::of(self, model, logs);
         let file = self.position.file;
         let own = if self.drive.file == file { logs } else { &logs[file..=file] };
-        let position = |locked: &LockedJoint| {
-            let [low, high] = range(own, &locked.column).unwrap_or_default();
-            let unit = units.unit_of_joint(model.joints()[locked.joint].kind, self.position.unit_of(&locked.column));
-            let factor = si_factor(unit, recording::Quantity::Position).unwrap_or(1.0);
-            format!("{} = {:?}", key(&name(locked)), rounded(0.5 * (low + high) * factor))
+        // The share of the range of a gripper whose positions have no unit.
+        let share = |locked: &LockedJoint| {
+            let range = range(own, &locked.column).filter(|_| self.position.unit_of(&locked.column).is_none())?;
+            unclear_gripper(&model.joints()[locked.joint], range)
         };
-        let reason = |locked: &LockedJoint| format!("{}: {}", name(locked), locked.reason);
+        let position = |locked: &LockedJoint| {
+            let logged = range(own, &locked.column).unwrap_or_default();
+            let middle = 0.5 * (logged[0] + logged[1]);
+            let kind = model.joints()[locked.joint].kind;
+            let unit = units.unit_of_joint(kind, self.position.unit_of(&locked.column), logged);
+            let factor = si_factor(unit, recording::Quantity::Position).unwrap_or(1.0) * units.factor_of_joint(kind);
+            let position = share(locked).map_or(middle * factor, |share| share.position(middle));
+            format!("{} = {:?}", key(&name(locked)), rounded(position))
+        };
+        let reason = |locked: &LockedJoint| {
+            let of_share = if share(locked).is_some() { " (in the log a share of its range)" } else { "" };
+            format!("{}: {}{of_share}", name(locked), locked.reason)
+        };
         let list = |text: &dyn Fn(&LockedJoint) -> String, separator: &str| {
             self.locked.iter().map(text).collect::<Vec<_>>().join(separator)
         };
-        let is_sure = self.locked.iter().all(|locked| locked.is_sure);
+        let is_sure = self.locked.iter().all(|locked| locked.is_sure && share(locked).is_none());
         table.with_line("lock", format!("{{ {} }}", list(&position, ", ")), list(&reason, "; "), is_sure)
     }
 
@@ -183,8 +195,14 @@ impl RecognisedColumns {
 
     fn command_table(&self, model: &Model, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
+        let torque = match &self.unused_torque {
+            None => "The log has no signed torque or current".to_owned(),
+            Some(columns) => {
+                format!("The log has torques or currents ({columns}), but these are not those of the joints above")
+            }
+        };
         let reason = format!(
-            "{}. The log has no signed torque or current: commands and positions identify the servos together with the robot. With known gains of the position controllers (MIT mode), `sum` in [format.torque] gives the torque instead: `dynident docs mit-mode`",
+            "{}. {torque}: commands and positions identify the servos together with the robot. With known gains of the position controllers (MIT mode), `sum` in [format.torque] gives the torque instead: `dynident docs mit-mode`",
             basis(&self.drive, "positions", &self.alternatives[2])
         );
         let table = Table::new("[format.command]", reason);
@@ -255,7 +273,8 @@ impl RecognisedColumns {
         let with_file = |table: Table, number: usize| {
             let table = table.with("file", quoted(&path_in_study(logs[number].0, from)), "");
             let part = self.parts.get(number).and_then(|part| part.as_deref());
-            part.iter().fold(table, |table, part| table.with("part", quoted(part), ""))
+            let table = part.iter().fold(table, |table, part| table.with("part", quoted(part), ""));
+            self.renamed_files(number).into_iter().fold(table, Table::with_own_format)
         };
         if let [only] = self.files[..] {
             let part = |[from, to]: [f64; 2]| format!("[{from:?}, {to:?}]");
