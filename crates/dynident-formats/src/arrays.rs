@@ -147,6 +147,10 @@ impl Table for ArrayTable {
         self.names.as_deref()
     }
 
+    fn has_numbered_entries(&self) -> bool {
+        true
+    }
+
     fn select(&mut self, columns: &[usize]) {
         self.wanted = columns.to_vec();
     }

@@ -33,6 +33,12 @@ pub trait Table: fmt::Debug + Send {
     /// Names of the columns, one for each; `None` if columns have 0-based indices only.
     fn names(&self) -> Option<&[String]>;
 
+    /// Whether a number also selects the column of a named entry, `q[2]` for `q[elbow]`: only in files of arrays, which
+    /// have one order of the columns.
+    fn has_numbered_entries(&self) -> bool {
+        false
+    }
+
     /// Groups of columns that were recorded together, in ascending order; every column belongs to one group.
     fn groups(&self) -> Vec<ColumnGroup> {
         vec![ColumnGroup { name: None, columns: 0..self.width(), time: None }]

@@ -88,7 +88,8 @@ impl ColumnSelection {
                     }),
                     (Some(first), None) => Ok(first),
                     (None, _) => {
-                        numbered_entry(name, names).ok_or_else(|| unknown(name.clone(), existing_names(name, names)))
+                        let entry = numbered_entry(name, names).filter(|_| self.table.has_numbered_entries());
+                        entry.ok_or_else(|| unknown(name.clone(), existing_names(name, names)))
                     }
                 }
             }

@@ -132,6 +132,10 @@ impl LogTable for FileTable {
         self.table.names()
     }
 
+    fn has_numbered_entries(&self) -> bool {
+        self.table.has_numbered_entries()
+    }
+
     fn groups(&self) -> Vec<LogGroup> {
         let groups = self.table.groups().into_iter();
         groups.map(|group| LogGroup { name: group.name, columns: group.columns, time: group.time }).collect()

@@ -149,6 +149,11 @@ pub trait LogTable: fmt::Debug + Send {
     /// If the row does not consist of numbers.
     fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError>;
 
+    /// Whether a number also selects the column of a named entry, `q[2]` for `q[elbow]`.
+    fn has_numbered_entries(&self) -> bool {
+        false
+    }
+
     /// Skips one row; returns false at the end.
     ///
     /// # Errors

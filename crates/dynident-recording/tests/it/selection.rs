@@ -66,6 +66,12 @@ fn columns_with_names_have_numbers_too() {
     assert_eq!(in_order.q, by_number.q);
     let missing = read(&golden.join("named.npz"), &format(["2", "0"])).unwrap_err();
     assert!(missing.contains("q[2]"), "{missing}");
+    // Messages and tables state no order of the joints.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, table(0..3)).unwrap();
+    let refused = read(&path, &BY_NAME.replace("{joint}", "{0..1}")).unwrap_err();
+    assert!(refused.contains("pos[0]"), "{refused}");
 }
 
 #[test]
