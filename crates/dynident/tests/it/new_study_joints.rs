@@ -101,8 +101,12 @@ fn a_gripper_does_not_hide_the_numbers_of_the_joints() {
             };
             let mut line = format!("{t}");
             let own = gripper(t, [5.0, 45.0]);
-            order.iter().for_each(|joint| write!(line, ",{}", value(joint, [q1, q2, own])).unwrap());
-            order.iter().for_each(|joint| write!(line, ",{}", value(joint, [tau1, tau2, 0.1 * own.sin()])).unwrap());
+            for joint in &order {
+                write!(line, ",{}", value(joint, [q1, q2, own])).unwrap();
+            }
+            for joint in &order {
+                write!(line, ",{}", value(joint, [tau1, tau2, 0.1 * own.sin()])).unwrap();
+            }
             line + "\n"
         });
         let (found, study) = written_of(&robot, &[log]).unwrap();
@@ -135,7 +139,7 @@ fn the_arm_of_the_robot_is_selected_among_two() {
     for (side, other) in [("left", "right"), ("right", "left")] {
         let joints = [1, 2].map(|joint| format!("arm_{side}_joint{joint}"));
         let robot = robot(folder.path(), joints.each_ref().map(String::as_str));
-        let (found, study) = written_of(&robot, &[log.clone()]).unwrap();
+        let (found, study) = written_of(&robot, core::slice::from_ref(&log)).unwrap();
         let [position, torque] = columns(&study);
         let expected = |what: &str, suffix: &str| {
             [1, 2].map(|joint| format!("observation.{what}[{side}_joint_{joint}.{suffix}]")).to_vec()

@@ -13,11 +13,12 @@ use std::path::Path;
 
 #[derive(Deserialize)]
 struct EarlierEstimate {
-    base_parameters: Vec<BaseParameterResult>,
-    #[serde(default)]
-    base_parameter_covariance: Vec<Vec<f64>>,
-    #[serde(default)]
-    base_parameter_joint_covariance: Vec<Vec<f64>>,
+    #[serde(rename = "base_parameters")]
+    parameters: Vec<BaseParameterResult>,
+    #[serde(rename = "base_parameter_covariance", default)]
+    covariance: Vec<Vec<f64>>,
+    #[serde(rename = "base_parameter_joint_covariance", default)]
+    joint_covariance: Vec<Vec<f64>>,
 }
 
 /// Smallest size to which a relative uncertainty is applied, relative to the largest value of the same kind in the
@@ -77,7 +78,7 @@ pub(super) fn with_earlier_torque(
     let path = folders.find(result, None)?;
     let found: EarlierEstimate = read_part(&path)?;
     let of = |symbol: &str| {
-        found.base_parameters.iter().find(|own| own.symbol == symbol && own.expression == symbol).map(|own| own.value)
+        found.parameters.iter().find(|own| own.symbol == symbol && own.expression == symbol).map(|own| own.value)
     };
     let found: Vec<(&TorqueTerm, f64)> = robot
         .terms()
@@ -147,21 +148,21 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let stored: EarlierEstimate = read_part(path)?;
-    let place = places(&stored.base_parameters, robot).map_err(wrong)?;
-    let rows = &stored.base_parameter_covariance;
+    let place = places(&stored.parameters, robot).map_err(wrong)?;
+    let rows = &stored.covariance;
     if rows.is_empty() {
         let message = "base_parameter_covariance is missing because an earlier version wrote the file: identify again";
         return Err(wrong(message.to_owned()));
     }
     let count = place.len();
-    let joint = Some(&stored.base_parameter_joint_covariance).filter(|joint| !joint.is_empty()).unwrap_or(rows);
+    let joint = Some(&stored.joint_covariance).filter(|joint| !joint.is_empty()).unwrap_or(rows);
     for (name, rows) in [("base_parameter_covariance", rows), ("base_parameter_joint_covariance", joint)] {
         if rows.len() != count || rows.iter().any(|row| row.len() != count) {
             return Err(wrong(format!("{name} is not {count} rows of {count} numbers: identify again")));
         }
     }
     let used: Vec<(usize, usize)> = (0..count)
-        .filter(|&index| stored.base_parameters[index].excited)
+        .filter(|&index| stored.parameters[index].excited)
         .filter_map(|index| Some((index, place[index]?)))
         .collect();
     // With few time segments, the covariance is singular: its variances are right, its correlations are not.

@@ -92,22 +92,20 @@ struct Run<'l, 'a> {
 /// The recordings in a folder. The files of a recording differ in the name of the joint, or otherwise in the last
 /// number of their names. All files are one recording, if a group would be a single file.
 fn runs_of_folder<'l, 'a>(files: &[&'l (&'a Path, LogContents)], joints: &[String]) -> Vec<Run<'l, 'a>> {
-    let splits: [&dyn Fn(&str) -> Option<[String; 2]>; 2] = [&|stem: &str| around_joint(stem, joints), &around_number];
-    for split in splits {
-        let stem = |path: &Path| path.file_stem()?.to_str().map(str::to_owned);
-        let around: Option<Vec<[String; 2]>> = files.iter().map(|(path, _)| split(&stem(path)?)).collect();
-        let Some(around) = around else { continue };
-        let mut runs: Vec<Run<'l, 'a>> = Vec::new();
-        for (around, file) in around.into_iter().zip(files.iter().copied()) {
-            match runs.iter_mut().find(|run| run.around == around) {
-                Some(run) => run.files.push(file),
-                None => runs.push(Run { around, files: vec![file] }),
-            }
+    let stem = |path: &Path| path.file_stem()?.to_str().map(str::to_owned);
+    let parts_by = |split: &dyn Fn(&str) -> Option<[String; 2]>| -> Option<Vec<[String; 2]>> {
+        files.iter().map(|(path, _)| split(&stem(path)?)).collect()
+    };
+    let around = parts_by(&|stem| around_joint(stem, joints)).or_else(|| parts_by(&around_number));
+    let mut runs: Vec<Run<'l, 'a>> = Vec::new();
+    for (around, file) in around.into_iter().flatten().zip(files.iter().copied()) {
+        match runs.iter_mut().find(|run| run.around == around) {
+            Some(run) => run.files.push(file),
+            None => runs.push(Run { around, files: vec![file] }),
         }
-        if runs.len() > 1 && runs.iter().all(|run| run.files.len() > 1) {
-            return runs;
-        }
-        break;
+    }
+    if runs.len() > 1 && runs.iter().all(|run| run.files.len() > 1) {
+        return runs;
     }
     vec![Run { around: [String::new(), String::new()], files: files.to_vec() }]
 }

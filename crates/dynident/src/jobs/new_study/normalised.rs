@@ -95,7 +95,9 @@ impl Normalised {
 
 /// Whether a column has a name as in LeRobot: `observation.state[elbow.pos]`, `action[0]`, `elbow.pos`.
 fn is_lerobot(column: &str) -> bool {
-    column.starts_with("observation.state") || column.starts_with("action") || column.ends_with(".pos")
+    column.starts_with("observation.state")
+        || column.starts_with("action")
+        || column.rsplit_once('.').is_some_and(|(_, quantity)| quantity == "pos")
 }
 
 /// Whether 0.001 degree fits the limits of all revolute joints, and degrees are far from them.
