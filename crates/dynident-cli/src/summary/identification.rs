@@ -424,7 +424,8 @@ fn masses(intervals: &[ParameterInterval]) -> String {
 }
 
 fn data(log: &LogSummary) -> String {
-    let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
+    let motion =
+        log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", positions filtered at {cutoff:.1}\u{a0}Hz"));
     format!(
         "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered rows per joint",
         log.log,

@@ -163,8 +163,8 @@ fn a_result_is_a_prior_for_the_next_run() {
     }
 }
 
-/// A result of one log has few time segments, so its covariance is singular, and its friction was selected from the log.
-/// It is a prior nevertheless.
+/// A result of one log has few time segments, so its covariance is singular, and its friction was selected from the
+/// log. It is a prior nevertheless.
 #[test]
 fn a_result_with_few_segments_and_other_friction_is_a_prior() {
     let folder = tempfile::tempdir().unwrap();
