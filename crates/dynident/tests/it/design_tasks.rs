@@ -183,7 +183,7 @@ fn a_result_with_few_segments_and_other_friction_is_a_prior() {
 
     let robot = repository("robots/ur10.urdf").display().to_string();
     let text = format!(
-        "robot.file = {robot:?}\n[drive]\ndrive_inertia = true\n\
+        "robot.file = {robot:?}\n\
          [design]\n{SMALL}\ntorque_std_nm = 1e6\nprior = {{ result = \"result.json\" }}\n"
     );
     let designed = designed(&Job::new(folder.path(), &text));

@@ -3,9 +3,10 @@
 use crate::error::{Error, StudyError};
 use crate::result::BaseParameterResult;
 use crate::result::read_part;
-use crate::study::{Folders, PriorSection, StudyRobot};
+use crate::study::{Folders, PriorSection, Study, StudyRobot};
 use dynident_dynamics::Column;
 use dynident_excitation::limits::KnownTorque;
+use dynident_identification::DriveInertiaChoice;
 use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -19,6 +20,8 @@ struct EarlierEstimate {
     covariance: Vec<Vec<f64>>,
     #[serde(rename = "base_parameter_joint_covariance", default)]
     joint_covariance: Vec<Vec<f64>>,
+    #[serde(default)]
+    drive_inertia_choice: Option<DriveInertiaChoice>,
 }
 
 /// Smallest size to which a relative uncertainty is applied, relative to the largest value of the same kind in the
@@ -64,6 +67,22 @@ pub(super) fn information(
         notes.push(format!("prior: inertial parameters of the robot description, standard deviation {percent} % each"));
     }
     Ok(total)
+}
+
+/// The study with the drive inertia that the earlier result selected, for joints whose drive inertia the study does not
+/// state.
+pub(super) fn with_earlier_drives(section: &PriorSection, study: &Study, folders: &Folders) -> Result<Study, Error> {
+    let mut study = study.clone();
+    let Some(result) = &section.result else { return Ok(study) };
+    let found: EarlierEstimate = read_part(&folders.find(result, None)?)?;
+    if let Some(choice) = &found.drive_inertia_choice {
+        for joint in &choice.joints {
+            let of_all = study.drive.drive_inertia;
+            let own = study.drive.joints.entry(joint.clone()).or_default();
+            own.drive_inertia = own.drive_inertia.or(of_all).or(Some(choice.seen));
+        }
+    }
+    Ok(study)
 }
 
 /// Adds friction and drive inertia of an earlier result: every term that is a base parameter by itself. They replace

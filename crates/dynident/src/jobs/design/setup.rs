@@ -74,6 +74,8 @@ impl DesignSetup {
         section.validate().map_err(Error::section(study.path, "design"))?;
         let inputs = InputFiles::of(study, options.data.as_deref());
         let folders = study.folders(options.data.as_deref());
+        let with_drives = prior::with_earlier_drives(&section.prior, &study, &folders)?;
+        let study = study.with_study(&with_drives);
         let robot = study.robot_in(&folders)?;
         let LimitsInForce { limits, assumed, not_checked } = in_force(study, &folders, &robot, purpose)?;
         notes.extend(included(&limits, robot.model()));
