@@ -21,7 +21,7 @@ pub(super) struct Table {
     heading: String,
     reason: String,
     lines: Vec<Line>,
-    /// Names of the files of this recording, in a `format` of its own.
+    /// Names of the files of this recording, in its own `format`.
     renamed: Option<RenamedFiles>,
 }
 

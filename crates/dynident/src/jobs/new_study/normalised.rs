@@ -88,7 +88,7 @@ impl Normalised {
             },
         );
         format!(
-            "or LeRobot's normalised range -100 to 100 ({why}): if the arm was calibrated over the full range of its joints, write unit = \"rad\", {keys} (and sign where a joint counts in the other direction); LeRobot records degrees with its option use_degrees. Decide this before corrections of `dynident check`"
+            "or LeRobot's normalised range -100 to 100 ({why}): if the arm was calibrated over the full range of its joints, write unit = \"rad\", {keys} (and `sign` where the direction of a joint is reversed); LeRobot records degrees with its option use_degrees. Decide this before corrections of `dynident check`"
         )
     }
 }
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn normalised_positions_are_distinguished_from_degrees() {
         let columns = ["action[a.pos]".to_owned(), "action[b.pos]".to_owned()];
-        // From 0 to 2 rad, of which the joint uses the upper three quarters.
+        // The limits are 0 and 2 rad; the joint moves from 0.5 to 1.97 rad.
         let beyond = logged(&[([-50.0, 97.0], [0.0, 2.0]), ([-60.0, 60.0], [-1.5, 1.5])]);
         let found = Normalised::find(&beyond, &columns).unwrap();
         let note = found.note(&beyond);
